@@ -6,7 +6,11 @@ import asyncio
 
 import pytest
 
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.interaction.input_device import InputDevice
 from roboglot.model.events import BumperPressed, BumperReleased, Event, EventStream
+from roboglot.model.inputs.external import ExternalInputs
+from roboglot.model.tap import Tap
 
 
 async def test_a_reader_gets_its_types_in_order() -> None:
@@ -82,17 +86,38 @@ def test_any_number_of_events_is_nested() -> None:
     assert heard == list(range(2000))
 
 
-def test_broken_listener_keeps_later_events_coming() -> None:
-    events, heard = EventStream(), list[float]()
+def test_broken_listener_keeps_no_event_from_others(caplog: pytest.LogCaptureFixture) -> None:
+    events, early, late = EventStream(), list[float](), list[float]()
 
     def break_at(event: Event) -> None:
         if event.stamp == 1.0:
             events.publish(BumperReleased(stamp=2.0, zone="front"))
-            raise ValueError
+        if event.stamp <= 3.0:
+            raise ValueError("no such bumper")
 
+    events.listen(Event, lambda event: early.append(event.stamp))
     events.listen(Event, break_at)
-    events.listen(Event, lambda event: heard.append(event.stamp))
-    with pytest.raises(ValueError, match=r"^$"):
-        events.publish(BumperPressed(stamp=1.0, zone="front"))
-    events.publish(BumperPressed(stamp=3.0, zone="front"))
-    assert heard == [2.0, 3.0]
+    events.listen(Event, lambda event: late.append(event.stamp))
+    with events.subscribe(Event) as queued:
+        for stamp in (1.0, 3.0, 4.0):
+            events.publish(BumperPressed(stamp=stamp, zone="front"))
+        assert early == late == [event.stamp for event in queued.drain()] == [1.0, 2.0, 3.0, 4.0]
+    lines = [record.getMessage().rpartition("<locals>.")[2] for record in caplog.records if record.exc_info]
+    assert lines == [f"break_at failed at {kind}: no such bumper" for kind in ("BumperPressed", "BumperReleased")]
+
+
+async def test_broken_listeners_harm_no_other() -> None:
+    clock, heard = LockstepClock(), list[object]()
+
+    def fail(_: object) -> None:
+        raise ValueError
+
+    tap, inputs, device = Tap("robot", clock), ExternalInputs("robot", clock), InputDevice()
+    for listen in (tap.listen, inputs.listen, device.listen):
+        listen(fail)
+        listen(heard.append)
+    tap.request("door", "operation", "")
+    inputs.note("kind", "name", {})
+    device.press("w")
+    assert [type(news).__name__ for news in heard] == ["Exchange", "Input", "Input"]
+    assert device.state.keys == ("w",)

@@ -31,6 +31,7 @@ from roboglot.model.client_context import connection, identity
 from roboglot.model.components.logistics.delivery import Delivery
 from roboglot.model.components.system.lease import Lease, moves
 from roboglot.model.errors import RobotError
+from roboglot.model.events.listeners import Failures, call_all
 from roboglot.model.robot import Robot
 from roboglot.model.tap import DRIVER, Direction, Exchange
 from roboglot.storage.transactions import FAILURES, Transactions
@@ -231,6 +232,7 @@ class RobotAdmission(Admission):
         self._needs: dict[str, Right] = {}
         self._allowed: dict[tuple[str, str], Right] = {}  # the right that sufficed; cleared when rights change
         self._listeners: list[Callable[[str], None]] = []
+        self._failures = Failures()
         self._gains: list[Callable[[str], None]] = []
         self._releasing: asyncio.Future[None] | None = None
         self._disowning: asyncio.Future[None] | None = None
@@ -370,8 +372,7 @@ class RobotAdmission(Admission):
             self._releasing = asyncio.ensure_future(self._robot[Lease].release())
         if cut and Delivery in self._robot:
             self._disowning = asyncio.ensure_future(self._robot[Delivery].disown(who))
-        for listener in tuple(self._listeners):
-            listener(who)
+        call_all(self._listeners, who, self._failures)
 
     def _note_reply(self, exchange: Exchange) -> None:
         """Audit a reply to a change, or a robot's refusal; ``check`` audits its own refusals."""

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from roboglot.model.client_context import client, connection
 from roboglot.model.clock import Clock
+from roboglot.model.events.listeners import Failures, call_all
 from roboglot.model.feed import Feed, Viewer
 
 QUEUE_MAX = 4096  # exchanges queued per viewer; beyond this they are dropped and counted
@@ -84,6 +85,7 @@ class Tap:
         self._robot = robot
         self._clock = clock
         self._listeners: list[Callable[[Exchange], None]] = []
+        self._failures = Failures()
         self._feed: Feed[Exchange] = Feed(self._look, self._look, queue_max=QUEUE_MAX)
 
     def subscribe(self) -> Viewer[Exchange]:
@@ -154,8 +156,7 @@ class Tap:
             seconds,
             self._clock.turn if direction is Direction.REQUEST else -1,
         )
-        for listener in tuple(self._listeners):
-            listener(exchange)
+        call_all(self._listeners, exchange, self._failures)
         if self._feed.viewers:
             self._feed.push(exchange)
         return now

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from roboglot.clients.robomaster.noting import Noting
+from roboglot.model.events.listeners import Failures
 from roboglot.model.feed import Feed, Viewer
 from roboglot.wire.robomaster.telemetry import Telemetry, parse_pushes
 
@@ -20,6 +21,7 @@ class Listeners:
         self.noting: Noting | None = None
         self._listeners: list[tuple[Listener, tuple[type[Telemetry], ...]]] = []
         self._feeds: set[Feed[Telemetry]] = set()
+        self._failures = Failures()
 
     def add(self, heard: Listener, kinds: tuple[type[Telemetry], ...]) -> Callable[[], None]:
         """Call ``heard`` with values of ``kinds`` (none: all); return a function to stop."""
@@ -47,7 +49,10 @@ class Listeners:
         for item in parse_pushes(data):
             for heard, kinds in tuple(self._listeners):
                 if not kinds or isinstance(item, kinds):
-                    heard(item)
+                    try:
+                        heard(item)
+                    except Exception as error:  # noqa: BLE001 - logged there
+                        self._failures.note(heard, item, error)
 
     def close(self) -> None:
         """End every viewer."""

@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import AsyncIterator, Callable
 from typing import Generic, Protocol, TypeVar, cast
 
+from roboglot.model.events.listeners import Failures
 from roboglot.values import dataclass
 
 QUEUE_MAX = 256  # unread events per reader, beyond which the oldest is dropped
@@ -86,11 +87,13 @@ class EventStream:
         self._receivers: dict[type[Event], tuple[Callable[[Event], None], ...]] = {}  # by the type of a published event
         self._delivering = False
         self._nested = deque[Event]()
+        self._failures = Failures()
 
     def publish(self, event: Event) -> None:
         """Deliver ``event`` at once: listeners are called, subscriptions get it queued.
 
-        One that a listener publishes follows when the present one is delivered to all, so that all see one order.
+        One that a listener publishes follows when the present one is delivered to all, so that all see one order. A
+        listener that raises keeps no event from the others.
         """
         if self._delivering:
             self._nested.append(event)
@@ -102,7 +105,10 @@ class EventStream:
                 if receivers is None:
                     receivers = self._receivers[type(event)] = self._receivers_of(type(event))
                 for receive in receivers:
-                    receive(event)
+                    try:
+                        receive(event)
+                    except Exception as error:  # noqa: BLE001 - logged there
+                        self._failures.note(receive, event, error)
                 if not self._nested:
                     break
                 event = self._nested.popleft()

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from roboglot.model.client_context import client, connection
 from roboglot.model.clock import Clock
+from roboglot.model.events.listeners import Failures, call_all
 
 ANSWER = "answer"  # kind: answer to a call that the robot made
 CAME, GONE, CALLED_OFF = "came", "gone", "called off"  # kinds: clients; the name is the door's
@@ -49,6 +50,7 @@ class ExternalInputs:
     def __init__(self, robot: str, clock: Clock) -> None:
         self._robot, self._clock = robot, clock
         self._listeners: list[Listener] = []
+        self._failures = Failures()
         self._playing = False
         self._asked: Counter[str] = Counter()
         self._waiting: dict[tuple[str, int], asyncio.Future[str]] = {}  # by name and its running number
@@ -75,8 +77,7 @@ class ExternalInputs:
             self._pass(Input(self._clock.time(), self._clock.turn, self._robot, kind, door, values, "", where))
 
     def _pass(self, given: Input) -> None:
-        for listener in tuple(self._listeners):
-            listener(given)
+        call_all(self._listeners, given, self._failures)
 
     @contextmanager
     def noting(self, kind: str, name: str, values: Mapping[str, object]) -> Iterator[None]:

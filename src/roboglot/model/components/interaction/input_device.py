@@ -8,6 +8,7 @@ from enum import StrEnum
 
 from roboglot.model.components.component import Component
 from roboglot.model.errors import InvalidGoal
+from roboglot.model.events.listeners import Failures, call_all
 from roboglot.values import dataclass
 
 NAMED_KEYS = ("space", "tab", "shift", "ctrl", "alt", "caps")
@@ -40,6 +41,7 @@ class InputDevice(Component):
     def __init__(self) -> None:
         self._state = Input()
         self._listeners: list[Callable[[Input], None]] = []
+        self._failures = Failures()
 
     @property
     def state(self) -> Input:
@@ -75,5 +77,4 @@ class InputDevice(Component):
     def _change(self, state: Input) -> None:
         if state != self._state:
             self._state = state
-            for listener in tuple(self._listeners):
-                listener(state)
+            call_all(self._listeners, state, self._failures)
