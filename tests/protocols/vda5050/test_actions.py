@@ -18,7 +18,7 @@ from roboglot.model.components.system.file_store import FileStore
 from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.errors import NotFound, Refused
 from roboglot.model.geometry import Twist
-from roboglot.model.tap import Direction
+from roboglot.model.tap import Direction, Exchange
 from roboglot.protocols.vda5050.chapters.sensing import REPORTS, REPORTS_MAX
 from roboglot.protocols.vda5050.context import UNDER_WAY_MAX
 from tests.protocols.held_fairness import held
@@ -229,11 +229,17 @@ async def test_hibernation_is_silent_until_it_ends(yard: Opened) -> None:
     assert states(one)["sleep"][0] == "FINISHED"
     assert (control.state["nodeStates"], control.state["driving"]) == ([], False)
     heard = len(control.heard["state"])
+    exchanges: list[Exchange] = []
+    leave = one.robot.tap.listen(exchanges.append)
     control.send("order", order("two", [(0, 0), (1, 0)]))
     control.send("instantActions", instant(action("stateRequest", "ignored")))
     await one.clock.advance(40)
+    leave()
     control.hear()
     assert len(control.heard["state"]) == heard
+    replies = [(one.operation, one.status, one.refusal) for one in exchanges if one.direction is Direction.REPLY]
+    asleep = "the robot hibernates"
+    assert replies == [("order", "silent", asleep), ("instantActions", "silent", f"{asleep}: stateRequest")]
     control.send("instantActions", instant(action("stopHibernation", "wake")))
     await one.until(lambda: control.heard["connection"][-1]["connectionState"] == "ONLINE")
     await one.until(lambda: states(one).get("wake", ("", ""))[0] == "FINISHED")

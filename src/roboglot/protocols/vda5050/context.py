@@ -7,7 +7,6 @@ has ended.
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -20,7 +19,7 @@ from roboglot.model.events import JackChanged
 from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
 from roboglot.protocols.vda5050.error_book import ErrorBook
-from roboglot.protocols.vda5050.errors import Rejected
+from roboglot.protocols.vda5050.errors import Ignored, Rejected
 from roboglot.protocols.vda5050.hibernation import Hibernation
 from roboglot.protocols.vda5050.maps import Maps
 from roboglot.protocols.vda5050.order_book import ActionState, ActionStatus, OrderBook, forget_oldest
@@ -32,7 +31,6 @@ from roboglot.protocols.vda5050.vocabulary import DOOR, is_loaded
 from roboglot.wire.vda5050.orders import Edge, InstantActions, Malformed, Node, OrderMessage, read
 from roboglot.wire.vda5050.versions import ErrorKind, Level, Version
 
-log = logging.getLogger(__name__)
 SOURCE = DOOR
 UNDER_WAY_MAX = 128  # instant actions, which each state lists; two messages may have so many
 START_REACH = 0.5  # m from an order's first node that count as being there
@@ -88,10 +86,9 @@ class Context:
             raise Rejected(ErrorKind.NOT_AVAILABLE, str(down)) from None
 
     def take_order(self, payload: bytes) -> None:
-        """Take an order or an update and drive it. Raises Rejected."""
+        """Take an order or an update and drive it. Raises Rejected, Ignored."""
         if self.hibernation.on:
-            log.info("robot %s hibernates: refused an order", self.robot.id)
-            return
+            raise Ignored("the robot hibernates")
         order = self._read(payload, OrderMessage)
         check_order(order, self.robot, self.version, self.map_id)
         new = order.order_id != self.book.order_id
@@ -115,14 +112,15 @@ class Context:
         return bool(pose.point.distance_to(_point(node)) <= max(START_REACH, place.reach))
 
     def take_instant_actions(self, payload: bytes) -> None:
-        """Begin each of the actions; those that cannot begin are FAILED, with an error. Raises Rejected."""
+        """Begin each of the actions; those that cannot begin are FAILED, with an error. Raises Rejected, Ignored."""
         message = self._read(payload, InstantActions)
         self.errors.forget_kind(ErrorKind.INSTANT_ACTION)
+        ignored: list[str] = []
         for action in message.actions:
             if action.action_id in self.instant:
                 continue  # already known
             if self.hibernation.on and action.action_type != "stopHibernation":
-                log.info("robot %s hibernates: refused %s", self.robot.id, action.action_type)
+                ignored.append(action.action_type)
                 continue
             state = self.instant[action.action_id] = ActionState(action)
             forget_oldest(self.instant)
@@ -130,6 +128,8 @@ class Context:
                 self._fail_instantly(state, f"at most {UNDER_WAY_MAX} instant actions are under way")
             else:
                 self.run_beside(self._do_instantly(state))
+        if ignored:
+            raise Ignored(f"the robot hibernates: {', '.join(ignored)}")
 
     @property
     def _under_way(self) -> int:

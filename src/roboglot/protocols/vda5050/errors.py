@@ -30,6 +30,10 @@ class Rejected(Exception):
         self.references = {key: str(value) for key, value in references.items()}
 
 
+class Ignored(Exception):
+    """Message, or a part of one, that the standard has a robot leave without an error, as it hibernates."""
+
+
 def kind_of(error: RobotError) -> ErrorKind:
     """Return the kind for ``error`` or its nearest ancestor in the table."""
     return next(KINDS[kind] for kind in type(error).__mro__ if kind in KINDS)
