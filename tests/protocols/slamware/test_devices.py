@@ -330,6 +330,9 @@ async def test_emergency_stop_of_another_door_shows_in_health(
     await forward(seconds=0.5)
     assert (await client.get(HEALTH)).json()["hasSystemEmergencyStop"] is True
     assert await put(client, "base.emergency_stop", "off") == 403  # only standing up ends it
+    (fault,) = (await client.get(HEALTH)).json()["baseError"]
+    assert (await client.delete(f"{HEALTH}/{fault['errorCode']}")).status_code == 403  # no success: it stays
+    assert (await client.get(HEALTH)).json()["baseError"] == [fault]
     robot[Legs].stand()
     await forward(seconds=4)
     assert (await client.get(HEALTH)).json()["hasSystemEmergencyStop"] is False

@@ -6,6 +6,7 @@ from roboglot.model.components.motion.emergency_stop import is_stopped
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.system.health import Fault, FaultLevel, Health
 from roboglot.model.components.system.link import Link, LinkState
+from roboglot.model.errors import Refused
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
@@ -15,6 +16,7 @@ from roboglot.wire.slamware.chapters.system.system import BaseError, BaseHealthI
 
 API = "/api/core/system/v1/robot/health"
 STOP = "emergency stop"  # the fault
+LIMP = "the robot is limp after an emergency stop: it has to stand up first"
 LEVELS = {FaultLevel.WARNING: Level.WARN, FaultLevel.ERROR: Level.ERROR, FaultLevel.FATAL: Level.FATAL}
 # Level, component, code and the number within the component, by the model's name of the fault, where known from robots.
 NUMBERS = {
@@ -86,13 +88,15 @@ def _has(robot: Robot, name: str) -> bool:
 
 @TABLE.on(f"DELETE {API}/{{error_code}}", right=Right.DRIVE, needs=(Health,))
 def clear_robot_health(context: Context, error_code: int) -> None:
-    """Dismiss a fault, which returns while its cause persists; 400 for an unknown code.
+    """Dismiss a fault, which returns while its cause persists; 400 for an unknown code, 403 while the legs are limp.
 
     The flags still show the robot's state.
     """
     health = context.robot[Health]
     if error_code not in {record.error_code for record in _records(context.robot)}:
         raise HttpError(400, "Invalid Error Code", str(error_code))
-    for fault in health.faults:
-        if record_of(fault).error_code == error_code:
-            health.dismiss(fault.id)
+    faults = [fault for fault in health.faults if record_of(fault).error_code == error_code]
+    if not faults:
+        raise Refused(LIMP)
+    for fault in faults:
+        health.dismiss(fault.id)

@@ -8,6 +8,7 @@ from roboglot.model.components.motion.emergency_stop import EmergencyStop, is_st
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
+from roboglot.protocols.slamware.chapters.system.health import LIMP
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE, Text
 from roboglot.wire.slamware.chapters.system.devices import Parameter, Readable
@@ -50,7 +51,7 @@ def _release(robot: Robot) -> None:
     """End the emergency stop. Raises Refused if only limp legs hold the robot, which standing up ends."""
     stop = robot[EmergencyStop]
     if is_stopped(robot) and not stop.engaged:
-        raise Refused("the robot is limp after an emergency stop: it has to stand up first")
+        raise Refused(LIMP)
     stop.release()
 
 
