@@ -19,7 +19,7 @@ import socket
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -260,14 +260,14 @@ _strangers_stay: list[str] = []  # for whose sake tests were skipped: later ones
 @pytest.fixture
 def slow_settings(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let settings be stored some steps of the loop later, as in a database's thread."""
-    put = StoredSettings.put
+    put_all = StoredSettings.put_all
 
-    async def put_later(store: StoredSettings, key: str, value: object) -> None:
+    async def put_later(store: StoredSettings, values: Mapping[str, object]) -> None:
         for _ in range(5):
             await asyncio.sleep(0)
-        await put(store, key, value)
+        await put_all(store, values)
 
-    monkeypatch.setattr(StoredSettings, "put", put_later)
+    monkeypatch.setattr(StoredSettings, "put_all", put_later)
 
 
 @pytest.fixture

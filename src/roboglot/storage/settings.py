@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from roboglot.model.components.system.settings import Settings
 from roboglot.storage.transactions import Connection, Transactions
@@ -23,10 +23,16 @@ class StoredSettings(Settings):
     def get(self, key: str, default: object = None) -> object:
         return self._values.get(key, default)
 
-    async def put(self, key: str, value: object) -> None:
-        writing, kept = self.writing(key, value), json.loads(json.dumps(value))
-        await self._database.run(writing)
-        self._values[key] = kept
+    async def put_all(self, values: Mapping[str, object]) -> None:
+        writes = [self.writing(key, value) for key, value in values.items()]
+        kept = json.loads(json.dumps(dict(values)))
+
+        def work(connection: Connection) -> None:
+            for write in writes:
+                write(connection)
+
+        await self._database.run(work)
+        self._values |= kept
 
     def writing(self, key: str, value: object) -> Callable[[Connection], object]:
         """Return the transaction that writes a setting."""

@@ -13,6 +13,7 @@ from roboglot.protocols.slamware.chapters.platform.event_log import EventLog
 from roboglot.protocols.slamware.chapters.slam.map_keeper import MapKeeper
 from roboglot.protocols.slamware.chapters.statistics.lifetime_totals import Totals
 from roboglot.protocols.slamware.chapters.system.laser import Laser
+from roboglot.protocols.slamware.chapters.system.masks import Masks
 from roboglot.values import dataclass
 
 
@@ -26,6 +27,7 @@ class Context:
     laser: Laser
     maps: MapKeeper
     limits: SpeedLimits
+    masks: Masks
     totals: Totals
     updater: Updater
     boxes: BoxLog

@@ -27,8 +27,8 @@ from roboglot.protocols.slamware.chapters.multi_floor.floor_maps import LoadedSt
 from roboglot.protocols.slamware.chapters.platform.event_log import EventLog
 from roboglot.protocols.slamware.chapters.slam.map_keeper import MapKeeper
 from roboglot.protocols.slamware.chapters.statistics.lifetime_totals import Totals
-from roboglot.protocols.slamware.chapters.system.devices import restore_masks
 from roboglot.protocols.slamware.chapters.system.laser import Laser
+from roboglot.protocols.slamware.chapters.system.masks import Masks
 from roboglot.protocols.slamware.config import CONNECTIONS_MAX, SlamwareConfig
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.dispatch import Application
@@ -61,6 +61,7 @@ class SlamwareDoor:
             Laser(robot),
             MapKeeper(robot, cloud, shifts, lambda: events.note(GeneralEvent.SYNC_MAP_FROM_CLOUD)),
             SpeedLimits(robot),
+            Masks(robot),
             Totals(robot),
             Updater(robot),
             BoxLog(robot),
@@ -100,7 +101,7 @@ class SlamwareDoor:
         if Storeys in self._robot:
             self._robot[Storeys].maps = LoadedStoreys(context)
         context.cloud.start()
-        restore_masks(self._robot)
+        context.masks.restore()
         self._endings = [
             listen(Rebooting, lambda _: self._fall_silent()),
             listen(ShuttingDown, lambda _: self._fall_silent()),
@@ -132,7 +133,7 @@ class SlamwareDoor:
 
     def _reopen(self) -> None:
         """Open again; state in memory was lost in the restart."""
-        restore_masks(self._robot)
+        self._context.masks.restore()
         starting = self._context.maps.starting.begin()
         self._opening = asyncio.get_running_loop().create_task(
             self._open_again(starting), name="slamware door opens again"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from abc import abstractmethod
+from collections.abc import Mapping
 from typing import Any
 
 from roboglot.model.components.component import Component
@@ -20,8 +21,12 @@ class Settings(Component):
         """Return the value, or ``default`` if never set."""
 
     @abstractmethod
+    async def put_all(self, values: Mapping[str, object]) -> None:
+        """Set values, all or none; return once they are on disk."""
+
     async def put(self, key: str, value: object) -> None:
         """Set a value; return once it is on disk."""
+        await self.put_all({key: value})
 
     async def keep(self, key: str, value: object) -> None:
         """Set what no client waits for: where that fails, the log says so."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
 from msgspec import Meta, Struct
@@ -57,6 +58,7 @@ class SimulatedBluetooth(Bluetooth):
         self._linked = False  # and whether it is in range
         self._found: tuple[BluetoothDevice, ...] = ()
         self._remembered: list[BluetoothDevice] | None = None
+        self._turn = asyncio.Lock()  # of changes of the history
         self._next = 0.0
 
     @property
@@ -110,9 +112,9 @@ class SimulatedBluetooth(Bluetooth):
             await self._robot.clock.sleep(self._section.connect_time)
             if not self._hears(gadget):
                 raise NotFound(f"{address} is out of radio range")
-            self._wanted, self._linked = gadget, True
             device = self._described(gadget)
-            await self._remember([device, *(known for known in self.history if known.address != address)])
+            await self._remember(lambda known: [device, *(other for other in known if other.address != address)])
+            self._wanted, self._linked = gadget, True
             self._robot.events.publish(BluetoothConnected(stamp=self._robot.clock.time(), device=device))
 
         return self._robot.actions.start("bluetooth connect", run, resources=[BLUETOOTH], goal=address, source=source)
@@ -124,14 +126,15 @@ class SimulatedBluetooth(Bluetooth):
         self._wanted, self._linked = None, False
 
     async def forget(self, address: str | None) -> None:
-        keep = self._wanted.gadget.address if self._wanted else None
-        if address is None:
-            left = [device for device in self.history if device.address == keep]
-        else:
-            left = [device for device in self.history if device.address != address]
-            if len(left) == len(self.history):
+        def edit(known: Sequence[BluetoothDevice]) -> list[BluetoothDevice]:
+            if address is None:
+                keep = self._wanted.gadget.address if self._wanted else None
+                return [device for device in known if device.address == keep]
+            if all(device.address != address for device in known):
                 raise NotFound(f"{address} was never connected")
-        await self._remember(left)
+            return [device for device in known if device.address != address]
+
+        await self._remember(edit)
 
     def update_device(self, *, source: str = "") -> Action:
         async def run(action: Action) -> None:
@@ -167,10 +170,13 @@ class SimulatedBluetooth(Bluetooth):
         else:
             self._robot.events.publish(BluetoothLost(stamp=stamp, device=device))
 
-    async def _remember(self, devices: list[BluetoothDevice]) -> None:
-        self._remembered = devices[:HISTORY_MAX]
-        if Settings in self._robot:
-            await self._robot[Settings].put(KEY, [dataclasses.asdict(device) for device in self._remembered])
+    async def _remember(self, edit: Callable[[Sequence[BluetoothDevice]], list[BluetoothDevice]]) -> None:
+        """Replace the known devices by ``edit`` of them, once that is stored."""
+        async with self._turn:
+            devices = edit(self.history)[:HISTORY_MAX]
+            if Settings in self._robot:
+                await self._robot[Settings].put(KEY, [dataclasses.asdict(device) for device in devices])
+            self._remembered = devices
 
     def _hears(self, gadget: GadgetInWorld) -> bool:
         return self._signal(gadget) >= self._section.sensitivity

@@ -45,10 +45,8 @@ async def set_nickname(call: Call, *, nick_name: Name, wake_name: str = "") -> d
     """Set the nickname and the wake word; without one, the wake word is a short name said twice."""
     if len(wake_name) > NAME_MAX:
         return call.refused({"success": False}, f"wake_name has more than {NAME_MAX} characters")
-    settings = call.context.robot[Settings]
-    await settings.put(NICKNAME, nick_name)
-    await settings.put(WAKE_WORD, wake_name or (nick_name * 2 if len(nick_name) <= 3 else nick_name))
-    await settings.put(NICKNAME_ON, True)
+    wake_word = wake_name or (nick_name * 2 if len(nick_name) <= 3 else nick_name)
+    await call.context.robot[Settings].put_all({NICKNAME: nick_name, WAKE_WORD: wake_word, NICKNAME_ON: True})
     return {"success": True}
 
 

@@ -11,7 +11,7 @@ from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.system.file_store import FileStore
 from roboglot.model.components.system.settings import Settings
-from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.model.errors import InvalidGoal, NotFound, RobotError
 from roboglot.model.maps import PointOfInterest
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.home_docks import BOUND, NAME, before, home_dock, settle_home
@@ -204,9 +204,15 @@ async def set_current_home_dock(context: Context, body: DockChoice) -> None:
     if found is None:
         raise NotFound(f"the loaded map has no dock {body.dock_id}")
     floor, dock = found
-    await context.robot[Settings].put(BOUND, dock.id)
+    settings = context.robot[Settings]
+    bound = settings.get(BOUND)
+    await settings.put(BOUND, dock.id)
     if floor.name != context.maps.current:
-        await context.maps.enter(floor.name.building, floor.name.floor, dock.pose, stop=context.actions.abort)
+        try:
+            await context.maps.enter(floor.name.building, floor.name.floor, dock.pose, stop=context.actions.abort)
+        except RobotError:
+            await settings.keep(BOUND, bound)
+            raise
     settle_home(context.robot)
 
 

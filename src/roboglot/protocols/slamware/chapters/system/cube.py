@@ -17,7 +17,6 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.speed_limits import CONFIGURED
-from roboglot.protocols.slamware.chapters.system.devices import MASKED, restore_masks
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.validation import decode_json, why_invalid
@@ -58,7 +57,6 @@ async def set_cube_config(context: Context, body: bytes) -> None:
         if missing := set(config.disabled_sensors) - known:
             raise NotFound(f"there are no sensors {sorted(missing)[:20]}")
     context.limits.check(config.max_moving_speed, config.max_angular_speed)
-    await robot[Settings].put(CONFIGURED, [config.max_moving_speed, config.max_angular_speed])
-    await robot[Settings].put(MASKED, sorted(set(config.disabled_sensors)))
+    speeds = {CONFIGURED: [config.max_moving_speed, config.max_angular_speed]}
+    await context.masks.set_masks(lambda _: dict.fromkeys(config.disabled_sensors, True), speeds)
     context.limits.reset()
-    restore_masks(robot)

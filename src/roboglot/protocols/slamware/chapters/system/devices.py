@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
 from typing import Annotated
 
@@ -13,7 +14,6 @@ from roboglot.model.components.sensing.depth_camera import DepthCamera
 from roboglot.model.components.sensing.sensor_masks import SensorMasks
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import NotFound
-from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
 from roboglot.protocols.slamware.context import Context
@@ -22,7 +22,6 @@ from roboglot.wire.slamware.chapters.slam.localization import Switch
 from roboglot.wire.slamware.chapters.system.devices import DisabledSensor, SensorSwitch
 
 SYSTEM, SENSORS = "/api/core/system/v1", "/api/core/sensors/v1"
-MASKED = "slamware.masked_sensors"  # the setting that holds the ids of sensors that stay off across restarts
 LOWEST, HIGHEST = 31, 26_000_001  # counts of the jack's drive at the ends, as seen on robots
 STAGES = {JackStage.DOWN: 2, JackStage.MOVING: 3, JackStage.STOPPED: 4, JackStage.UP: 5}
 
@@ -102,22 +101,10 @@ async def set_sensor_mask(context: Context, body: Annotated[list[SensorSwitch], 
     masks = context.robot[SensorMasks]
     if missing := {switch.id for switch in body} - {sensor.id for sensor in masks.sensors}:
         raise NotFound(f"there are no sensors {sorted(missing)[:20]}")
-    for switch in body:
-        if switch.is_enabled:
-            masks.unmask(switch.id)
-        else:
-            masks.mask(switch.id, always=switch.is_always)
-    await context.robot[Settings].put(MASKED, sorted(id for id, always in masks.masked.items() if always))
+    changes = {switch.id: None if switch.is_enabled else switch.is_always for switch in body}
+
+    def edit(before: Mapping[int, bool]) -> dict[int, bool]:
+        return {id: always for id, always in {**before, **changes}.items() if always is not None}
+
+    await context.masks.set_masks(edit)
     return True
-
-
-def restore_masks(robot: Robot) -> None:
-    """Restore the masks at a start: exactly those that are to be off always."""
-    if SensorMasks not in robot or Settings not in robot:
-        return
-    masks, always = robot[SensorMasks], set(robot[Settings].get(MASKED, []))
-    for sensor in masks.sensors:
-        if sensor.id in always:
-            masks.mask(sensor.id, always=True)
-        else:
-            masks.unmask(sensor.id)
