@@ -63,15 +63,17 @@ class Round:
         await self._note(PickUp(stop=cabinet))
 
     async def _visit(self, stop: str, seconds: float) -> None:
-        """Drive to a stop and wait for the people there; a timeout fails the stop, not the order. Raises Failed."""
+        """Drive to a stop and wait for the people there. Raises Failed."""
         policy = self._book.policy
         await self._set(stage=OrderStage.DRIVING_TO_STOP, stop=stop)
         await self._driver.go_to(stop, policy, policy.delivery_speed)
         await self._set(stage=OrderStage.AT_STOP)
-        done = (
-            await self._signals.wait_for(Signal.OPERATION_DONE, seconds=seconds or policy.pickup_seconds)
-            or seconds > 0.0
-        )
+        await self._operate(stop, seconds)
+
+    async def _operate(self, stop: str, seconds: float) -> None:
+        """Wait for the people at a stop; a timeout fails the stop, not the order. ``seconds``: 0 is until they end."""
+        patience = seconds or self._book.policy.pickup_seconds
+        done = await self._signals.wait_for(Signal.OPERATION_DONE, seconds=patience) or seconds > 0.0
         await self._note(PickUp(stop=stop, failure=None if done else Failure.NOT_TAKEN))
 
     async def _meet(self) -> None:
@@ -80,8 +82,7 @@ class Round:
             case OrderKind.GUIDE | OrderKind.RETURN | OrderKind.DISINFECT:
                 return
             case OrderKind.ROUND:
-                seconds = self._wait(len(self._order.request.stops))
-                await self._signals.wait_for(Signal.OPERATION_DONE, seconds=seconds or policy.pickup_seconds)
+                await self._operate(self._order.request.target, self._wait(len(self._order.request.stops)))
             case OrderKind.FOOD | OrderKind.RECYCLE:
                 served = await self._signals.wait_for(Signal.END, Signal.OPERATION_DONE, seconds=policy.food_seconds)
                 if not served and kind is OrderKind.FOOD:

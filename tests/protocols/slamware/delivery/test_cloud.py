@@ -159,6 +159,24 @@ async def test_an_industrial_round(screen: Screen, cloud: Path) -> None:
     assert task["status"] == "SUCCEEDED"
 
 
+@pytest.mark.parametrize("ended", [True, False])
+async def test_operation_without_an_end_is_reported(screen: Screen, cloud: Path, ended: bool) -> None:
+    """The order ended as if a person had been there."""
+    await screen.prepare(press=(1.0, 0.0, ""))
+    await screen.wait_for_pickups(seconds=40)
+    give(cloud, "round", type="INDUSTRY", task_targets=[{"target_name": "press", "action": "unload"}], order_id="r-1")
+    for _ in range(40):
+        await screen.forward(seconds=1)
+        (task,) = (await screen.client.get(INDUSTRY, params={"status": "all"})).json() or [None]
+        if task and task["result"].get("stage") == "WAIT_OPERATION":
+            break
+    if ended:
+        assert await screen.say("end_operation") == 204
+    await screen.forward(seconds=1 if ended else 42)
+    (task,) = (await screen.client.get(INDUSTRY, params={"status": "all"})).json()
+    assert (task["status"], task["result"]["reason"]) == ("SUCCEEDED", "" if ended else "NO_PICKUP")
+
+
 async def test_impossible_and_unknown_tasks_are_refused(
     screen: Screen, robot: Robot, world: World, cloud: Path, forward: Forward
 ) -> None:

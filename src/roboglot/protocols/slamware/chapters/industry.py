@@ -125,7 +125,7 @@ def _task(context: Context, call: Call) -> IndustryTask:
 
 
 def _round(context: Context, order: Order) -> IndustryTask:
-    """Return a round of the cloud, which the robot carries out by itself."""
+    """Return a round of the cloud, which the robot carries out by itself; the reason may be that of a failed stop."""
     request = order.request
     points = zip((*request.stops, request.target), request.tasks, request.waits, strict=True)
     targets = [IndustryTarget(place, action, round(wait)) for place, action, wait in points]
@@ -135,7 +135,8 @@ def _round(context: Context, order: Order) -> IndustryTask:
     stage = ""
     if order.status is OrderStatus.RUNNING:
         stage = ride_word(context.actions.current) or _stage_of(order)
-    result = IndustryResult(stage=stage, reason=reason_of(order.failure), timestamp=_time(order.changed_at))
+    failure = order.failure or next((result.failure for result in order.results if result.failure), None)
+    result = IndustryResult(stage=stage, reason=reason_of(failure), timestamp=_time(order.changed_at))
     return IndustryTask(order.id, asked, order.status.value.upper(), result)
 
 
