@@ -58,7 +58,12 @@ _INDOORS = {TaskState.LOCALIZING, TaskState.LOCALIZED, TaskState.LOCALIZATION_FA
 NAVIGATION_STATES = _INDOORS | {OUTDOORS[state] for state in _INDOORS}
 
 
-@TABLE.on(Code.START_TASK, right=Right.DRIVE, needs=(Docking, Following, Localization, MappingComponent, Navigation))
+@TABLE.on(
+    Code.START_TASK,
+    right=Right.DRIVE,
+    needs=(Localization, MappingComponent),  # a robot without a map has nothing that the other tasks need
+    some=(Docking, Following, Navigation),
+)
 async def start_task(
     call: Call,
     *,
