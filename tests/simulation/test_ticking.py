@@ -18,7 +18,7 @@ from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import RobotError
 from roboglot.model.events import Event
-from roboglot.model.geometry import Pose, Twist, Vector3
+from roboglot.model.geometry import Point, Pose, Twist, Vector3
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
@@ -246,3 +246,37 @@ async def test_timers_of_real_time_find_ticks_done() -> None:
     await clock.advance(0.5)
     assert stamps == [pytest.approx(math.floor(when / TICK) * TICK) for when in (2.125, 2.15, 2.31, 2.33)]
     world.close()
+
+
+async def staged(body: str, clock: LockstepClock) -> list[str]:
+    """Return the course of a resting robot that is moved by hand at odd times."""
+    world = World(load_world("yard"), [RobotPlacement("a", body, start=Pose(5.0, 5.0))], clock=clock)
+    world.equip(Robot("a", world.description_of("a"), clock))
+    await world.prepare(wait=True)
+    world.start()
+    dice, lines, stage = random.Random(5), list[str](), world.stage
+    await clock.advance(2.5)
+    for change in (
+        lambda: stage.place("a", Pose(6.0, 5.0, 0.5)),
+        lambda: stage.roll_over("a"),
+        lambda: stage.reset("a"),
+        lambda: stage.pull("a", Point(60.0, 0.0)),
+        lambda: stage.pull("a", Point(0.0, 0.0)),
+        lambda: stage.add_obstacle(Pose(7.0, 5.0)),
+    ):
+        await clock.advance(dice.uniform(2.0, 2.1))
+        change()
+        for _ in range(40):
+            await clock.advance(TICK)
+            hull = world._population.hull("a")
+            lines.append(
+                f"{hull.pose} {hull.elevation:.6f} {hull.overturned} {world.robot('a')[Odometry].reading.pose}"
+            )
+    world.close()
+    return lines
+
+
+@pytest.mark.parametrize("body", ["universal", "robomaster_ep"])
+async def test_rest_in_real_time_moves_no_hand(body: str) -> None:
+    """A robot moved by hand began to slide or fall up to 80 ms before it was."""
+    assert await staged(body, PassingClock()) == await staged(body, CountingClock())

@@ -27,22 +27,29 @@ T = TypeVar("T")
 S = TypeVar("S", bound=Stage)
 
 
-def noted(stage: S, inputs: ExternalInputs) -> S:
-    """Wrap ``stage`` to note its changes, for callers outside the world."""
-    return cast(S, _Noted(stage, Stage, inputs, {}))
+def noted(stage: S, inputs: ExternalInputs, before: Callable[[], object]) -> S:
+    """Wrap ``stage`` to note its changes, for callers outside the world; call ``before`` ahead of each."""
+    return cast(S, _Noted(stage, Stage, inputs, before, {}))
 
 
 class _Noted:
     """Wrapper of a stage or a person; ``given`` is added to each note."""
 
-    def __init__(self, inner: object, kind: type, inputs: ExternalInputs, given: Mapping[str, object]) -> None:
-        self._inner, self._kind, self._inputs, self._given = inner, kind, inputs, given
+    def __init__(
+        self,
+        inner: object,
+        kind: type,
+        inputs: ExternalInputs,
+        before: Callable[[], object],
+        given: Mapping[str, object],
+    ) -> None:
+        self._inner, self._kind, self._inputs, self._before, self._given = inner, kind, inputs, before, given
 
     def __getattr__(self, name: str) -> object:
         value = getattr(self._inner, name)
         if name == PERSON:
             return self._person
-        if not self._inputs.watched or name in LOOKS or not inspect.isfunction(getattr(self._kind, name, None)):
+        if name in LOOKS or not inspect.isfunction(getattr(self._kind, name, None)):
             return value
         return partial(self._carry_out, name, value)
 
@@ -50,10 +57,13 @@ class _Noted:
         return dir(self._inner)
 
     def _person(self, name: str) -> StagePerson:
-        person = _Noted(cast(Stage, self._inner).person(name), StagePerson, self._inputs, {PERSON: name})
-        return cast(StagePerson, person)
+        person = cast(Stage, self._inner).person(name)
+        return cast(StagePerson, _Noted(person, StagePerson, self._inputs, self._before, {PERSON: name}))
 
     def _carry_out(self, name: str, method: Callable[..., T], /, *args: object, **named: object) -> T:
+        self._before()
+        if not self._inputs.watched:
+            return method(*args, **named)
         values = _signature(self._kind, name).bind(None, *args, **named).arguments
         values.pop("self")
         whole = {**self._given, **{key: msgspec.to_builtins(value, enc_hook=_samples) for key, value in values.items()}}

@@ -133,7 +133,7 @@ class World:
         self.truth = Truth(self._population, self._environment)
         self.own_stage = WorldStage(self._population, self._environment, clock, lambda: self.faults)
         self.inputs = ExternalInputs("", clock)
-        self.stage = noted(self.own_stage, self.inputs)
+        self.stage = noted(self.own_stage, self.inputs, self._wake)
         self.faults = Faults(self, description.faults)
         self._robot_ticks = RobotTicks(self._physics.tables, TICK)
         self._ticking = Ticking(self._physics, self._crowd, self._robot_ticks, TICK)
@@ -235,7 +235,7 @@ class World:
             robot.detach()
 
     def _wake(self) -> None:
-        """Do the ticks that have passed while all robots rested, before one of them does something."""
+        """Do the ticks that have passed while all robots rested, before one of them acts or is acted on."""
         if passed := self._beat.end_rest():
             left = self._ticking.run(passed, self._beat.ticks, self._beat.origin, followed=True)
             self._beat.ticks += left.ticks
