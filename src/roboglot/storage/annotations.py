@@ -8,15 +8,7 @@ from collections.abc import Callable
 import msgspec
 
 from roboglot.model.clock import Clock
-from roboglot.model.components.mapping.annotations import (
-    AREAS_MAX,
-    LINES_MAX,
-    MARKS_MAX,
-    POINTS_MAX,
-    Annotations,
-    MapAnnotations,
-)
-from roboglot.model.errors import InvalidGoal
+from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
 from roboglot.model.events import AnnotationsChanged, EventStream
 from roboglot.storage.transactions import Connection, Transactions
 
@@ -45,16 +37,7 @@ class StoredAnnotations(MapAnnotations):
 
     def writing(self, changed: Annotations) -> Callable[[Connection], object]:
         """Return the transaction that writes annotations; call with ``turn`` held. Raises InvalidGoal for too many."""
-        for what, entries, most in (
-            ("lines", changed.lines, LINES_MAX),
-            ("areas", changed.areas, AREAS_MAX),
-            ("docks", changed.docks, MARKS_MAX),
-            ("landmarks", changed.landmarks, MARKS_MAX),
-        ):
-            if len(entries) > most:
-                raise InvalidGoal(f"more than {most} {what}")
-        if sum(line.count() for line in changed.lines) > POINTS_MAX:
-            raise InvalidGoal(f"the lines have more than {POINTS_MAX} points, of which a curve has ten a metre")
+        changed.check_limits(self._current)
         body = msgspec.json.encode(changed).decode()
         return lambda connection: connection.execute(
             "INSERT INTO annotations (robot, body) VALUES (?, ?) ON CONFLICT (robot) DO UPDATE SET body=excluded.body",

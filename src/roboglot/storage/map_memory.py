@@ -30,6 +30,10 @@ class StoredMapMemory(MapMemory):
         self._database = database
         self._places, self._annotations, self._settings, self._files = places, annotations, settings, files
 
+    async def check_store(self) -> None:
+        async with self._places.turn, self._annotations.turn:
+            await self._database.run(self._annotations.writing(self._annotations.current))
+
     async def replace(self, edit: Callable[[Drawings], Replacement]) -> None:
         async with self._places.turn, self._annotations.turn:
             before = self._annotations.current

@@ -18,6 +18,7 @@ from roboglot.media.ros_map import encode_ros_map
 from roboglot.model.components.mapping.annotations import Annotations, Area, AreaKind, Line, LineKind, MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
+from roboglot.model.components.mapping.map_memory import check_store
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking
@@ -63,6 +64,8 @@ async def mapping(robot: Robot, *, on: bool) -> None:
 @VERBS.on("clear_map", right=Right.EDIT, needs=(Mapping,))
 async def clear_map(robot: Robot) -> None:
     """Forget the map; where the robot stands becomes the new origin."""
+    robot.require(Mapping)
+    await check_store(robot)
     robot[Mapping].clear()
 
 

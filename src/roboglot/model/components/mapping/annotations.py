@@ -10,6 +10,7 @@ from dataclasses import field, replace
 from enum import StrEnum
 
 from roboglot.model.components.component import Component
+from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.values import dataclass
@@ -132,6 +133,24 @@ class Annotations:
         """Return those of one kind, oldest first."""
         return tuple(area for area in self.areas if area.kind is kind)
 
+    def check_limits(self, before: Annotations | None = None) -> None:
+        """Raise InvalidGoal for more than a robot can use at a time, unless there is no more than ``before``."""
+        sizes, most = self._sizes(), before._sizes() if before else {}
+        for what, limit in (("lines", LINES_MAX), ("areas", AREAS_MAX), ("docks", MARKS_MAX), ("landmarks", MARKS_MAX)):
+            if sizes[what] > max(limit, most.get(what, 0)):
+                raise InvalidGoal(f"more than {limit} {what}")
+        if sizes["points"] > max(POINTS_MAX, most.get("points", 0)):
+            raise InvalidGoal(f"the lines have more than {POINTS_MAX} points, of which a curve has ten a metre")
+
+    def _sizes(self) -> dict[str, int]:
+        return {
+            "lines": len(self.lines),
+            "areas": len(self.areas),
+            "docks": len(self.docks),
+            "landmarks": len(self.landmarks),
+            "points": sum(line.count() for line in self.lines),
+        }
+
     def with_new(self, *entries: Line | Area) -> Annotations:
         """Return a copy with further annotations, which get new ids."""
         fresh = [replace(entry, id=self.last_id + number) for number, entry in enumerate(entries, 1)]
@@ -155,5 +174,5 @@ class MapAnnotations(Component):
     async def change(self, edit: Callable[[Annotations], Annotations]) -> None:
         """Replace the current annotations by ``edit`` of them, serialized; return once they are on disk.
 
-        An error of ``edit`` is raised and nothing changes. Raises InvalidGoal beyond ``LINES_MAX`` and similar limits.
+        An error of ``edit`` is raised and nothing changes. Raises what ``Annotations.check_limits`` does.
         """

@@ -91,6 +91,10 @@ class MapMemory(Component):
         annotations are never reused.
         """
 
+    @abstractmethod
+    async def check_store(self) -> None:
+        """Raise what storing drawings raises now: on a full disk, no map is changed whose drawings could not follow."""
+
     async def move(self, origin: Pose) -> None:
         """Move the drawings to the map's new ``origin``, and store by how much in all."""
 
@@ -160,6 +164,12 @@ class MapMemory(Component):
 def moved(robot: Robot) -> Pose:
     """Return the origin to which ``MapMemory.move`` has moved the drawings in all, in their former frame."""
     return Pose(*robot[Settings].get(MOVED, ()))
+
+
+async def check_store(robot: Robot) -> None:
+    """Raise what storing the drawings raises now, if the robot has any."""
+    if MapMemory in robot:
+        await robot[MapMemory].check_store()
 
 
 def exchange(robot: Robot) -> AbstractContextManager[None]:

@@ -6,6 +6,7 @@ import logging
 
 from roboglot.confirmation import confirmed
 from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
+from roboglot.model.components.mapping.map_memory import check_store
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.errors import Refused, RobotError
 from roboglot.model.events import MapReplaced
@@ -27,6 +28,7 @@ async def build_map(context: Context, task: Task, *, outdoor: bool) -> TaskResul
     """
     robot, mapping, survey = context.robot, context.robot[Mapping], Survey(outdoor)
     enabled = mapping.enabled
+    await check_store(robot)
     async with confirmed():
         mapping.clear()
         mapping.enable(True)
@@ -54,6 +56,11 @@ async def keep_map(context: Context, name: str) -> bool:
     if context.survey.replaced:
         return not name
     if not name:
+        try:
+            await check_store(context.robot)
+        except RobotError as error:
+            log.warning("the map was not discarded: %s", error)
+            return False
         mapping.clear()
         return True
     grid = mapping.grid

@@ -139,12 +139,13 @@ class MapKeeper:
         """Use the map of a file's start floor from now on, in memory only, after calling ``stop``."""
         floor = _start_of(self._robot, await self._parse(data))
         async with self._turn:
+            await self._robot[MapMemory].check_store()
             draw = put_drawings(self._robot, floor, {})  # the present drawings belong to no file
             await self._use(floor, pose, draw, stop)
 
     async def upload(self, data: bytes) -> None:
         """Store the file on disk unchanged, without loading it. Raises InvalidGoal unless it could be loaded."""
-        _require_grids(await self._parse(data))
+        _require_usable(await self._parse(data))
         async with self._turn:
             await self._robot[FileStore].write(FILE, data)
 
@@ -188,6 +189,8 @@ class MapKeeper:
         used, and not if there is none.
         """
         async with self._turn:
+            if not restarting:  # a start with a full disk still has the grid
+                await self._robot[MapMemory].check_store()
             before, self.status = self.status, MapLoadStatus.LOADING
             try:
                 await self._fetch()
@@ -221,7 +224,7 @@ class MapKeeper:
             if data == await files.read(FILE):
                 return
         try:
-            _require_grids(await self._parse(data))
+            _require_usable(await self._parse(data))
         except InvalidGoal as error:
             log.warning("cannot read the cloud's map: %s", error)
             return
@@ -232,6 +235,7 @@ class MapKeeper:
         """Use the map of another loaded floor, with its last drawings, after calling ``stop``. Raises NotFound."""
         if (loaded := self._loaded.find(building, floor)) is not None:
             async with self._turn:
+                await self._robot[MapMemory].check_store()
                 await self._use(loaded, pose, self._turn_over(loaded, self._loaded.digest), stop)
             return
         raise NotFound(f"no floor {floor!r} of {building!r} is loaded")
@@ -265,6 +269,7 @@ class MapKeeper:
         try:
             if floor.grid is None:
                 raise InvalidGoal(NO_GRID)
+            floor.annotations.check_limits(self._robot[MapAnnotations].current)
             stop()
             with exchange(self._robot):
                 async with confirmed():
@@ -286,6 +291,7 @@ class MapKeeper:
     async def clear(self) -> None:
         """Clear the map and begin a new one where the robot is; return once the drawings are on it."""
         origin, memory = self._robot[Localization].pose, self._robot[MapMemory]
+        await memory.check_store()
         with memory.exchange():
             async with confirmed():  # the drawings stay where a real robot refuses
                 with memory.left_to_caller():
@@ -322,6 +328,7 @@ class MapKeeper:
     async def move_origin(self, point: Point) -> None:
         """Move the origin of the map in memory to ``point``, by whole cells; drawings keep their places."""
         memory = self._robot[MapMemory]
+        await memory.check_store()
         with memory.exchange():
             async with confirmed():
                 with memory.left_to_caller():
@@ -366,9 +373,10 @@ def _take_place_at(dock: PointOfInterest, robot: Robot) -> None:
         log.warning("the home dock of robot %s cannot be its place: %s", robot.id, error)
 
 
-def _require_grids(floors: Sequence[FloorMap]) -> None:
+def _require_usable(floors: Sequence[FloorMap]) -> None:
     """Raise InvalidGoal for a floor that could not be loaded."""
     for floor in floors:
+        floor.annotations.check_limits()
         if floor.grid is None:
             raise InvalidGoal(f"floor {floor.name.floor} of the map has no grid" if floor.name.floor else NO_GRID)
 
