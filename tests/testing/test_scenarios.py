@@ -131,7 +131,7 @@ def test_leftovers_of_a_command_end_with_its_scenario(tmp_path: Path) -> None:
     """It would disturb the next one, and outlive all of them."""
     (tmp_path / "leaves.yaml").write_text(
         "name: it leaves one\ngiven: {world: empty, lockstep: true}\n"
-        "when:\n  - run: setsid sh -c 'echo $$ >left; exec sleep 3600' >/dev/null 2>&1 &\n"
+        "when:\n  - run: env -i setsid sh -c 'echo $$ >left; exec sleep 3600' >/dev/null 2>&1 &\n"
         "  - run: until test -s left; do sleep 0.01; done; kill -0 $(cat left)\n"
         "then: [{travelled: {at_most: 1}}]\n"
     )

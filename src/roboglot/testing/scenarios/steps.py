@@ -7,24 +7,20 @@ import http.client
 import json
 import math
 import os
-import signal
-import subprocess
-import uuid
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from roboglot.clients.errors import ClientError
-from roboglot.hosting.leftovers import MARK, end_marked
 from roboglot.model.errors import RobotError
 from roboglot.model.geometry import Pose
 from roboglot.testing.blocking import Blocking
 from roboglot.testing.programs import ProgramFailed
 from roboglot.testing.scenarios.checks import Checker
+from roboglot.testing.scenarios.commands import Commands, NotEnded
 from roboglot.testing.scenarios.files import STEPS, BadScenario, Step, fault_of, verb_of
 from roboglot.testing.server import NotInTime, RobotServer
 from roboglot.text_files import text_of
 
-OUTPUT_MAX = 1 << 20  # characters kept of a command's output
 SHOWN_MAX = 2000  # characters of its end shown after a failure
 ANSWER_MAX = 16 << 20
 
@@ -39,7 +35,7 @@ class Steps:
     def __init__(self, server: RobotServer, checker: Checker, folder: Path) -> None:
         self._server, self._checker, self._folder = server, checker, folder
         self._clients: dict[str, Blocking] = {}
-        self._mark = ":".join(filter(None, (os.environ.get(MARK), uuid.uuid4().hex)))
+        self._commands = Commands(folder, self.environment)
         self._verbs: Mapping[str, Callable[[Step], None]] = {name: getattr(self, f"_{name}") for name in STEPS}
 
     def play(self, step: Step) -> None:
@@ -52,7 +48,7 @@ class Steps:
 
     def close(self) -> None:
         """End what commands have left running, in whichever session."""
-        end_marked(self._mark)
+        self._commands.close()
 
     def environment(self) -> dict[str, str]:
         """Return a command's environment, with variables that point to the robots."""
@@ -64,7 +60,6 @@ class Steps:
             "ROBOGLOT_URL": server.url,
             "ROBOGLOT_PROGRAMS": server.programs_url.removesuffix("/programs"),
             "ROBOGLOT_APP_PORT": str(server.app_port),
-            MARK: self._mark,
         }
         with contextlib.suppress(ImportError, OSError):
             server.clients.certificates()
@@ -73,30 +68,13 @@ class Steps:
 
     def _run(self, step: Step) -> None:
         command = step.run or ""
-        process = subprocess.Popen(
-            command,
-            shell=True,
-            cwd=self._folder,
-            env=self.environment(),
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            start_new_session=True,
-        )
         try:
-            output, _ = process.communicate(timeout=step.within)
-        except subprocess.TimeoutExpired:
-            _end_group(process)
-            output, _ = process.communicate()
-            raise StepFailed(f"{command!r} has not ended after {step.within:g} s\n{output[-SHOWN_MAX:]}") from None
-        except BaseException:  # even Ctrl-C must leave no process behind
-            _end_group(process)
-            raise
-        self._checker.printed += output[-OUTPUT_MAX:].splitlines()
-        if process.returncode:
-            raise StepFailed(f"{command!r} ended with {process.returncode}\n{output[-SHOWN_MAX:]}")
+            status, output = self._commands.run(command, step.within)
+        except NotEnded as late:
+            raise StepFailed(f"{command!r} has not ended after {step.within:g} s\n{str(late)[-SHOWN_MAX:]}") from None
+        self._checker.printed += output.splitlines()
+        if status:
+            raise StepFailed(f"{command!r} ended with {status}\n{output[-SHOWN_MAX:]}")
 
     def _rest(self, step: Step) -> None:
         method, _, path = (step.rest or "").partition(" ")
@@ -169,12 +147,6 @@ class Steps:
             made = getattr(self._server.clients, f"new_{kind}")(robot)
             found = self._clients[kind + robot] = self._server.clients.open(made)
         return found
-
-
-def _end_group(process: subprocess.Popen[str]) -> None:
-    """Kill a command and its children."""
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)
 
 
 def _has(have: object, wanted: object) -> bool:
