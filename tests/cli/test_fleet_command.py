@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING, cast
 import pytest
 
 from roboglot.cli import fleet
+from roboglot.hosting.folder_lock import lock_folder
 from roboglot.shards import nursery_client, serving
 from roboglot.shards.plan import PLAN, load, plan_fleet, save
 from roboglot.shards.requests import Answer, RobotRow, Row
-from roboglot.shards.states import Shards, State
+from roboglot.shards.states import DETACHED, Shards, State
 from roboglot.testing.addresses import free_addresses
 
 if TYPE_CHECKING:
@@ -191,6 +192,23 @@ def test_options_that_a_cluster_ignores_are_refused(tmp_path: Path) -> None:
         fleet.up(worlds=1, first_address=free_addresses(1), memory_max=9, on="local", data=tmp_path)
 
 
+def test_folder_in_use_is_named_before_joining(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Joining a cluster takes up to a minute."""
+    monkeypatch.setattr(fleet, "_joined", lambda *_: pytest.fail("the cluster was joined"))
+    lock = lock_folder(tmp_path)
+    with pytest.raises(SystemExit, match=r"^roboglot fleet: another roboglot uses "):
+        fleet.up(worlds=1, first_address=free_addresses(1), on="local", data=tmp_path)
+    os.close(lock)
+
+
+def test_detached_shards_are_named_without_a_fleet(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit, match=f"^roboglot fleet: no fleet is up in {tmp_path}$"):
+        fleet.show(data=tmp_path)
+    (tmp_path / DETACHED).write_text("ray://head")
+    with pytest.raises(SystemExit, match="may still run: `roboglot fleet up --on ray://head --detached` serves them"):
+        fleet.show(data=tmp_path)
+
+
 def test_looking_for_a_robot_makes_no_registry(tmp_path: Path) -> None:
     with pytest.raises(SystemExit, match=r"^roboglot fleet: there is no file .*typo.db$"):
         fleet.where("a", registry=str(tmp_path / "typo.db"))
@@ -214,7 +232,7 @@ def test_file_of_another_program_stays_as_it_is(content: bytes | str, tmp_path: 
 
 def test_a_missing_log_is_named(tmp_path: Path) -> None:
     save(plan_fleet(1, 1, {}, tmp_path), tmp_path)
-    with pytest.raises(SystemExit, match=r"^roboglot fleet: .*/shards/w1/log: No such file or directory$"):
+    with pytest.raises(SystemExit, match=r"^roboglot fleet: shard w1 has no log yet$"):
         fleet.logs("a1", data=tmp_path)
 
 

@@ -37,7 +37,7 @@ from roboglot.shards.joining import join, joined, own_token
 from roboglot.shards.messages import Beat, Ready, Refusal
 from roboglot.shards.plan import plan_fleet
 from roboglot.shards.ray_processes import RayProcesses
-from roboglot.shards.states import State
+from roboglot.shards.states import State, detached_on
 from roboglot.storage.opening import open_registry
 from roboglot.storage.robot_registry import Claim, RobotRegistry
 from roboglot.testing.addresses import free_addresses, free_port
@@ -115,6 +115,7 @@ async def test_killed_nodes_robots_run_elsewhere_and_none_twice(cluster: Cluster
     nodes = {n.node_id[:12]: n for n in (cluster.add_node(num_cpus=1, object_store_memory=STORE) for _ in range(2))}
     template = {"registry": str(registry), "console": {"enabled": False}}
     plan = plan_fleet(2, 1, template, tmp_path, first=FIRST)
+    (tmp_path / "fleet").mkdir()
     with joined(cluster.address):
         fleet = ClusterFleet(plan, tmp_path / "fleet", cluster.address)
         try:
@@ -280,7 +281,21 @@ async def test_shards_of_an_earlier_plan_end(tmp_path: Path, monkeypatch: pytest
     assert len(new) == 3
     assert {*new} < {*old}, "those with the same settings"
     assert {*await up(2, "127.16.6.1")} & {*new} == {"another:w1:1234"}
+    (tmp_path / "of another fleet").mkdir()
     assert len(await up(2, "127.16.6.1", tmp_path / "of another fleet")) == 5
+
+
+@pytest.mark.parametrize(("where", "left"), [("ray://head", ""), ("local", "ray://head")])
+async def test_detached_shards_are_known_until_ended(
+    where: str, left: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster_module, "ray", FakeRay())
+    for cluster, lasting, known in (("ray://head", True, "ray://head"), (where, False, left)):
+        fleet = ClusterFleet(plan_fleet(1, 1, {}, tmp_path), tmp_path, cluster, lasting=lasting)
+        await fleet.start()
+        assert detached_on(tmp_path) == "ray://head"
+        await fleet.close()
+        assert detached_on(tmp_path) == known
 
 
 async def test_a_shard_that_cannot_start_is_logged_once(

@@ -76,7 +76,7 @@ def up(
         refuse_without("roboglot fleet", "up", dict.fromkeys(name.partition(".")[0] for name in ("numba", *FOREIGN)))
     began = time.monotonic()
     with launched(wanted=not on) as nursery:  # it loads while we import what a plan needs
-        from roboglot.hosting.folder_lock import FolderInUse
+        from roboglot.hosting.folder_lock import FolderInUse, locked
         from roboglot.hosting.logs import set_up_logging
         from roboglot.shards.serving import Interrupted, serve
 
@@ -91,7 +91,7 @@ def up(
                 raise ValueError("--memory-max is for shards without --on: Ray places and limits its own")
             where = _MachineOptions(on, detached, memory_max << 20, nursery)
             say = partial(print, file=sys.stdout, flush=True)  # also where a cluster has it print to standard error
-            with _joined(plan, on):
+            with locked(folder), _joined(plan, on):  # joining takes long
                 asyncio.run(serve(lambda: _fleet_host(plan, folder, where), folder, say, began, lasting=detached))
         except Interrupted as early:
             print(f"roboglot fleet: {early}", file=sys.stderr)
@@ -238,8 +238,11 @@ def logs(
         plan = load(folder)
         if plan is None:
             raise LookupError(f"there is no fleet in {folder}")
-        with (folder / "shards" / plan.find(shard).name / LOG_FILE).open(encoding="utf-8", errors="replace") as file:
+        name = plan.find(shard).name
+        with (folder / "shards" / name / LOG_FILE).open(encoding="utf-8", errors="replace") as file:
             print(visible("".join(deque(file, lines))), end="")
+    except FileNotFoundError:
+        sys.exit(f"roboglot fleet: shard {name} has no log yet")
     except (LookupError, ValueError, OSError) as error:
         sys.exit(f"roboglot fleet: {error.args[0] if isinstance(error, LookupError) else in_words(error)}")
 
@@ -317,8 +320,16 @@ def _fleet_host(plan: FleetPlan, folder: Path, where: _MachineOptions) -> FleetH
 def _ask(verb: Verb, data: Path | None, **fields: str) -> Answer:
     """Return the fleet's answer; without one, or after a refusal, end the program with a sentence."""
     from roboglot.shards.requests import SOCKET, Answer, Request
+    from roboglot.shards.states import detached_on
 
-    return running.request("fleet", _folder(data) / SOCKET, Request(verb, **fields), Answer, PATIENCE, "no fleet is up")
+    folder = _folder(data)
+    absent = f"no fleet is up in {folder}"
+    if where := detached_on(folder):
+        absent += (
+            f"; shards that were started with --detached may still run: `roboglot fleet up --on {where} --detached`"
+            " serves them again, and without --detached it stops them when it ends"
+        )
+    return running.request("fleet", folder / SOCKET, Request(verb, **fields), Answer, PATIENCE, absent)
 
 
 def _print(answer: Answer, name: str) -> None:

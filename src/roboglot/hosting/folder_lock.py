@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import fcntl
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 
@@ -26,3 +28,13 @@ def lock_folder(folder: Path) -> int:
         os.close(lock)
         raise FolderInUse(f"another roboglot uses {folder}; stop it, or choose another folder with --data") from None
     return lock
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Context in which the folder is locked for this process. Raises FolderInUse, OSError."""
+    lock = lock_folder(folder)
+    try:
+        yield
+    finally:
+        os.close(lock)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import logging
-import os
 import sqlite3
 from collections.abc import Iterator
 from concurrent.futures import Future
@@ -20,13 +19,12 @@ import msgspec
 
 from roboglot.extras import explaining
 from roboglot.hosting.error_text import in_words
-from roboglot.hosting.folder_lock import lock_folder
 from roboglot.shards.actor import Condition, ShardActor
 from roboglot.shards.joining import LOCAL, NAMESPACE
 from roboglot.shards.messages import Beat
 from roboglot.shards.plan import FleetPlan, ShardPlan, save
 from roboglot.shards.ray_processes import RayProcesses
-from roboglot.shards.states import LOG_FILE, Shard, Shards, State, rotate
+from roboglot.shards.states import DETACHED, LOG_FILE, Shard, Shards, State, detached_on, rotate
 from roboglot.storage.dead_programs import DeadProgramWatch
 from roboglot.storage.opening import open_registry
 from roboglot.storage.registry_lease import LEASE, holder_of
@@ -68,12 +66,11 @@ class Actor(Protocol):
 
 
 class ClusterFleet:
-    """One fleet on a joined cluster. ``lasting``: its shards outlive this program."""
+    """One fleet on a joined cluster. ``lasting``: its shards outlive this program, which a file in the folder tells."""
 
     def __init__(self, plan: FleetPlan, folder: Path, where: str, *, lasting: bool = False) -> None:
-        """Lock ``folder`` for this program. Raises FolderInUse."""
-        self.plan, self.folder, self._lasting, self._local = plan, folder, lasting, where == LOCAL
-        self._lock = lock_folder(folder)
+        """``folder``: locked for this program."""
+        self.plan, self.folder, self._where, self._lasting, self._local = plan, folder, where, lasting, where == LOCAL
         self.shards = Shards(plan, folder)
         self._mark = holder_of(folder)[:8]  # a folder of this name may be there on other machines
         self._ray = RayProcesses()
@@ -102,6 +99,8 @@ class ClusterFleet:
         """
         save(self.plan, self.folder)
         await self._end_strangers()
+        if self._lasting:
+            (self.folder / DETACHED).write_text(self._where, encoding="utf-8")
         for shard in self.shards.values():
             await self._begin(shard)
         self._registry_watch = self._loop.create_task(_free_dead_robots(self.plan), name="watch for dead programs")
@@ -114,7 +113,7 @@ class ClusterFleet:
         return 0.0
 
     async def close(self) -> None:
-        """Stop all shards, unless ``lasting``, and release the folder."""
+        """Stop all shards, unless ``lasting``."""
         self.shards.end()
         tasks = [task for task in (self._watch, self._registry_watch) if task is not None]
         for task in tasks:
@@ -125,7 +124,8 @@ class ClusterFleet:
             for error in ends:
                 if isinstance(error, Exception):
                     log.warning("ending a shard: %s", _first_line(error))
-        os.close(self._lock)
+            if detached_on(self.folder) == self._where and not any(ends):
+                (self.folder / DETACHED).unlink()
 
     async def stop(self, shard: Shard) -> None:
         """Stop a shard and leave it stopped."""

@@ -48,7 +48,7 @@ async def serve(
         await _either(host.ended, starting)
         if not starting.done():
             host.ended.result()
-            raise Interrupted("interrupted before all worlds were up")
+            raise Interrupted(f"interrupted before all worlds were up{'; those that were started go on' * lasting}")
         keep = keep and not isinstance(starting.exception(), NoWorld)
         seconds, keep = starting.result(), True
         page.open()

@@ -12,6 +12,7 @@ from roboglot.shards.messages import Beat, Ready
 from roboglot.shards.plan import FleetPlan, ShardPlan
 
 LOG_FILE = "log"
+DETACHED = "detached"  # file in the fleet's folder: the cluster on which its shards outlive `fleet up`
 LOG_MAX = 10 << 20  # bytes of a shard's log from which the next start begins a new one
 
 
@@ -99,6 +100,14 @@ class Shards(dict[str, Shard]):
     async def settle(self) -> None:
         """Wait until every shard is ready, has failed, or was stopped."""
         await self.until(lambda: all(shard.is_settled for shard in self.values()))
+
+
+def detached_on(folder: Path) -> str:
+    """Return the cluster on which shards of this folder's fleet may run without `fleet up`; empty: none."""
+    try:
+        return (folder / DETACHED).read_text(encoding="utf-8")
+    except OSError:
+        return ""
 
 
 def rotate(log: Path) -> None:

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import msgspec
 
-from roboglot.hosting.folder_lock import lock_folder
 from roboglot.hosting.process import has_ended
 from roboglot.shards.messages import MESSAGE_MAX, Beat, News, Ready, Refusal
 from roboglot.shards.nursery_client import NotWarm, NurseryClient, StartedNursery
@@ -40,10 +39,9 @@ class Supervisor:
     def __init__(
         self, plan: FleetPlan, folder: Path, *, memory_max: int = 0, nursery: StartedNursery | None = None
     ) -> None:
-        """``memory_max``: bytes per shard; 0: unlimited. Raises FolderInUse if another program uses the folder."""
+        """``folder``: locked for this program; ``memory_max``: bytes per shard; 0: unlimited."""
         self._memory_max = memory_max
         self.plan, self.folder = plan, folder
-        self._lock = lock_folder(folder)
         self.shards = Shards(plan, folder)
         self._by_number = {shard.number: shard for shard in self.shards.values()}
         self._nursery = NurseryClient(self._born, self._dead, nursery)
@@ -77,7 +75,7 @@ class Supervisor:
         return seconds
 
     async def close(self) -> None:
-        """Stop all shards, the nursery, and release the folder."""
+        """Stop all shards and the nursery."""
         self._closing = True
         self.shards.end()
         for handle in (self._watch, self._turn, *(shard.again for shard in self.shards.values())):
@@ -86,7 +84,6 @@ class Supervisor:
         await self._nursery.close()
         for shard in self.shards.values():
             self._unlink(shard)
-        os.close(self._lock)
 
     async def stop(self, shard: Shard) -> None:
         """Stop a shard and leave it stopped. Raises FleetEnds."""

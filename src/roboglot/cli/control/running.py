@@ -28,16 +28,17 @@ def request(
     request: msgspec.Struct,
     kind: type[A],
     patience: float,
-    absent: str = "no `roboglot up` answers",
+    absent: str = "",
 ) -> A:
     """Return the answer from the socket ``path`` within ``patience`` s.
 
-    Without one, or if it is a refusal, end the program with a sentence that names ``command``.
+    Without one, or if it is a refusal, end the program with a sentence that names ``command``; ``absent`` is that if
+    no program has the socket.
     """
     try:
         answer = asyncio.run(exchange(path, request, kind, patience))
     except (FileNotFoundError, ConnectionRefusedError):
-        sys.exit(f"roboglot {command}: {absent} in {path.parent}")
+        sys.exit(f"roboglot {command}: {absent or f'no `roboglot up` answers in {path.parent}'}")
     except TimeoutError:
         sys.exit(f"roboglot {command}: no answer from {path.parent} in {patience:g} s; it may still be carried out")
     except OSError as error:
