@@ -72,6 +72,16 @@ class PostgreSQLServer:
             time.sleep(0.05)
         raise RuntimeError("PostgreSQL did not start")
 
+    @contextmanager
+    def hanging(self) -> Iterator[None]:
+        """Context in which the server takes connections and never answers; those that are open go on."""
+        assert self._server is not None
+        self._server.send_signal(signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            self._server.send_signal(signal.SIGCONT)
+
     def stop(self) -> None:
         """Stop at once; every client loses the connection."""
         if self._server:

@@ -7,14 +7,15 @@ import os
 import signal
 import threading
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import psycopg
 import pytest
 
-from roboglot.storage import postgresql
+from roboglot.hosting.steady_time import uptime
+from roboglot.storage import postgresql, postgresql_connection
 from roboglot.storage.opening import open_database
-from roboglot.storage.postgresql_connection import LimitedConnection
+from roboglot.storage.postgresql_connection import LimitedConnection, Patience
 from roboglot.storage.settings import StoredSettings
 from tests.storage.postgresql_server import PostgreSQLServer, needs_postgresql
 
@@ -31,8 +32,8 @@ async def test_silent_server_fails_what_waits_for_it(
         ours = connection.execute("SELECT pid FROM pg_stat_activity WHERE application_name='roboglot'").fetchall()
     for (process,) in ours:
         os.kill(process, signal.SIGSTOP)
-    monkeypatch.setattr(LimitedConnection, "answer_max", 0.2)
-    monkeypatch.setattr(postgresql, "connect", lambda _url: (_ for _ in ()).throw(psycopg.OperationalError("silence")))
+    monkeypatch.setattr(Patience, "answer_max", 0.2)
+    monkeypatch.setattr(postgresql, "connect", lambda *_: (_ for _ in ()).throw(psycopg.OperationalError("silence")))
     try:
         saving = asyncio.ensure_future(asyncio.gather(settings.put("x", 2), return_exceptions=True))
         await asyncio.wait([saving], timeout=30.0)
@@ -57,7 +58,7 @@ async def test_work_that_waits_shares_a_failed_connection(
     await settings.put("x", 1)
     tries, all_wait = list[str](), threading.Event()
 
-    def fail(url: str) -> NoReturn:
+    def fail(url: str, _: type) -> NoReturn:
         tries.append(url)
         all_wait.wait(30.0)
         raise psycopg.OperationalError("no answer")
@@ -75,3 +76,31 @@ async def test_work_that_waits_shares_a_failed_connection(
     assert len(tries) == 1
     await settings.put("x", 3)
     database.close()
+
+
+@needs_postgresql
+async def test_closing_waits_little_for_silent_servers(
+    db_server: PostgreSQLServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C came while a connection was renewed: that took five seconds more, and each work behind it as well."""
+    database = open_database(tmp_path / "unused", db_server.url)
+    settings = StoredSettings(database, "a")
+    await settings.put("x", 1)
+    monkeypatch.setattr(postgresql_connection, "CLOSE_MAX", 0.2)
+    connecting = threading.Event()
+
+    def connect(*given: Any) -> LimitedConnection:
+        connecting.set()
+        return postgresql_connection.connect(*given)
+
+    monkeypatch.setattr(postgresql, "connect", connect)
+    with psycopg.connect(db_server.url, autocommit=True) as connection:
+        ends = "SELECT pg_terminate_backend(pid, 5000) FROM pg_stat_activity WHERE application_name='roboglot'"
+        connection.execute(ends)
+        with db_server.hanging():
+            saving = asyncio.gather(*(settings.put("x", number) for number in range(10)), return_exceptions=True)
+            await asyncio.to_thread(connecting.wait, 30.0)
+            began = uptime()
+            await asyncio.to_thread(database.close)
+            assert {str(failed) for failed in await saving} == {"the database cannot be reached"}
+            assert uptime() - began < postgresql_connection.CONNECT_MAX / 2

@@ -24,6 +24,7 @@ import typer
 from roboglot.cli.screen import announce, warn_if_open
 from roboglot.config import Config, RobotConfig, load_config, parse_robot, refuse_unguarded
 from roboglot.hosting import open_files
+from roboglot.hosting.closing import started
 from roboglot.hosting.error_text import in_words
 from roboglot.hosting.folder_lock import FolderInUse
 from roboglot.hosting.logs import set_up_logging
@@ -244,7 +245,8 @@ async def _serve(config: Config, *, open_console: bool) -> int:
 async def _run(runtime: Runtime, stop: asyncio.Event, *, open_console: bool) -> None:
     """Start the robots, announce that, and wait until ``stop`` is set."""
     warn_if_open(runtime.config)
-    await runtime.start()
+    if not await started(runtime.start(), stop):
+        return
     gc.enable()
     page = runtime.console.address if runtime.console is not None and runtime.console.port else ""
     announce(runtime.config, {name: doors.endpoints for name, doors in runtime.doors.items()}, page)

@@ -18,6 +18,7 @@ import msgspec
 from roboglot.config import Config, config_of
 from roboglot.console.studio.programs import ClassHome
 from roboglot.hosting import open_files
+from roboglot.hosting.closing import started
 from roboglot.hosting.error_text import in_words
 from roboglot.hosting.folder_lock import FolderInUse
 from roboglot.hosting.logs import set_up_logging
@@ -108,17 +109,18 @@ async def _serve(config: Config, reporter: Reporter, class_home: ClassHome | Non
 
     stop, loop = asyncio.Event(), asyncio.get_running_loop()
     open_files.OpenFiles().watch(loop)
-    if threading.current_thread() is threading.main_thread():  # in a Ray actor, the process belongs to Ray
-        loop.add_signal_handler(signal.SIGTERM, stop.set)
-    reporter.watch(stop)
-    try:
+    try:  # until there is something to close, SIGTERM ends the process at once: a silent database may block it
         runtime = Runtime(config, class_home=class_home)
     except (FolderInUse, ValueError, OSError, sqlite3.Error, RobotError) as error:
         # A killed predecessor may hold folder and addresses for a moment; wrong settings stay wrong.
         reporter.send(Refusal(_why(error), lasting=isinstance(error, ValueError)))
         return 1
+    if threading.current_thread() is threading.main_thread():  # in a Ray actor, the process belongs to Ray
+        loop.add_signal_handler(signal.SIGTERM, stop.set)
+    reporter.watch(stop)
     try:
-        await runtime.start()
+        if not await started(runtime.start(), stop):
+            return 0
         page = runtime.console.address if runtime.console is not None and runtime.console.port else ""
         endpoints = {
             name: [(endpoint.label, endpoint.address) for endpoint in doors.endpoints]

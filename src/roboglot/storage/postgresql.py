@@ -22,7 +22,7 @@ import psycopg
 
 from roboglot.hosting.steady_time import uptime
 from roboglot.model.components.system.disk import Disk
-from roboglot.storage.postgresql_connection import CLOSE_MAX, LimitedConnection, NoAnswer, close, connect
+from roboglot.storage.postgresql_connection import LimitedConnection, Patience, close, connect, limited_by
 from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseError, DiskFull, Rows
 from roboglot.transport.log_limiter import LogLimiter
 
@@ -61,7 +61,8 @@ class PostgreSQL:
         self._own = threading.local()
         self._opened: list[LimitedConnection] = []
         self._opening = threading.Lock()
-        self._ends = threading.Event()
+        self._patience = Patience()
+        self._kind = limited_by(self._patience)
         self._lock_timeout = CLAIM_MAX
         self._threads = ThreadPoolExecutor(
             max_workers=connections,
@@ -139,14 +140,15 @@ class PostgreSQL:
 
     def _begin(self, begin: bytes, asked: float) -> LimitedConnection:
         """Return this thread's connection with a transaction begun; reconnects if it died while idle."""
+        if self._patience.silent:
+            raise psycopg.OperationalError(self._patience.silent)
         connection: LimitedConnection | None = getattr(self._own, "connection", None)
         if connection is not None and not connection.closed:
             try:
                 connection.execute(begin)
-            except psycopg.OperationalError as error:
+            except psycopg.OperationalError:
                 connection.close()
-                if self._ends.is_set() and isinstance(error, NoAnswer):  # who ends does not try a silent server again
-                    self._own.failed = uptime(), str(error)
+                if self._patience.silent:
                     raise
             else:
                 return connection
@@ -188,7 +190,7 @@ class PostgreSQL:
         if failed_at > asked:
             raise psycopg.OperationalError(why)
         try:
-            connection = connect(self._url)
+            connection = connect(self._url, self._kind)
         except psycopg.Error as error:
             error.args = (without_password(str(error), self._url),)
             self._own.failed = uptime(), str(error)
@@ -197,11 +199,13 @@ class PostgreSQL:
             self._opened[:] = [*(opened for opened in self._opened if not opened.closed), connection]
         return connection
 
+    def end_soon(self) -> None:
+        """Wait for a silent server no longer than a program that ends may."""
+        self._patience.end_soon()
+
     def close(self) -> None:
         """Finish queued work, then close the connections."""
-        self._ends.set()
-        for connection in self._opened:
-            connection.answer_max = CLOSE_MAX
+        self.end_soon()
         self._threads.shutdown()
         self._readers.shutdown()
         for connection in self._opened:

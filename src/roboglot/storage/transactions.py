@@ -73,5 +73,8 @@ class Transactions(Protocol):
     def run_now(self, work: Callable[[Connection], T]) -> T:
         """Run ``work`` and block: for start-up, and where nothing else may run meanwhile."""
 
+    def end_soon(self) -> None:
+        """Prepare for ``close``, which must not wait long for a server that is silent."""
+
     def close(self) -> None:
         """Finish queued work, then close the database."""
