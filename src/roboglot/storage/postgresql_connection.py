@@ -31,7 +31,7 @@ class NoAnswer(psycopg.OperationalError):
 
 
 class Patience:
-    """How long a program waits for one server: less from ``end_soon`` on, and not again once that was silent."""
+    """Time for which a program waits for a server: less from ``end_soon`` on; one that was silent then is not asked."""
 
     answer_max = ANSWER_MAX  # s
 
