@@ -277,8 +277,7 @@ class Runtime:
 
     async def close(self) -> None:
         """Stop the robots, close doors, world, engine and file; parts that take too long are abandoned."""
-        databases = {self._database, self._registry, self._access_database} - {None}
-        for database in databases:
+        for database in filter(None, (self._database, self._registry, self._access_database)):
             database.end_soon()
         if self.console is not None:
             await close_in_time("the console", self.console.close())
