@@ -203,9 +203,14 @@ def _undivided(path: Path, file: IO[bytes]) -> Iterator[McapRecord]:
             why = f"{path} is not an MCAP file"
             raise BadRecording(why) from None
     if not has_all:
-        rest = file.seek(0, SEEK_END) - read
-        until = f"{(last - max(first, 0)) / 1e9:.1f} s ({datetime.fromtimestamp(last / 1e9, UTC):%F %T} UTC)"
-        log.warning("%s is cut off: it is read until %s; %d bytes after that are not a whole record", path, until, rest)
+        log.warning("%s is cut off: %s", path, _readable(first, last, file.seek(0, SEEK_END) - read))
+
+
+def _readable(first: int, last: int, rest: int) -> str:
+    """Return what was read of a file that is cut off: up to a time (ns), and without ``rest`` bytes."""
+    until = f"{(last - first) / 1e9:.1f} s ({datetime.fromtimestamp(last / 1e9, UTC):%F %T} UTC)"
+    found = "it has no messages" if first < 0 else f"it is read until {until}"
+    return found + f"; the last {f'{rest} bytes are' if rest > 1 else 'byte is'} not a whole record" * (rest > 0)
 
 
 def unpacked(path: Path, chunk: Chunk) -> Sequence[McapRecord]:
