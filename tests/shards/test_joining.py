@@ -20,7 +20,7 @@ os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 
 import ray
 
-from roboglot.shards.joining import join, own_token
+from roboglot.shards.joining import NICENESS, join, own_token
 from roboglot.testing.addresses import free_addresses
 
 # Ray's own threads leave sockets and files to the collector.
@@ -71,6 +71,19 @@ def test_ray_that_gave_itself_up_is_started_again(failures: int, monkeypatch: py
         with pytest.raises(OSError, match=r"^--on local: this machine is too busy: Ray gave itself up 3 times because"):
             join("local")
     assert [process.wait(60) for process in left] == [-signal.SIGKILL] * failures
+
+
+def test_shards_have_the_priority_of_their_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With Ray's own they stood still beside busy processes."""
+    found: list[str | None] = []
+    monkeypatch.setattr(ray, "init", lambda **_: found.append(os.environ.get(NICENESS)))
+    monkeypatch.setattr(os, "getpriority", lambda *_: 7)
+    monkeypatch.setitem(os.environ, NICENESS, "")  # restored afterwards
+    del os.environ[NICENESS]
+    join("local")
+    os.environ[NICENESS] = "3"  # the user's own
+    join("local")
+    assert found == ["7", "3"]
 
 
 def test_silent_head_is_named_with_both_reasons(monkeypatch: pytest.MonkeyPatch, head: str) -> None:

@@ -17,6 +17,7 @@ from roboglot.hosting.error_text import in_words
 from roboglot.shards.ray_processes import children, end_children
 
 TOKENS = "RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"
+NICENESS = "RAY_worker_niceness"
 
 
 def own_token(environment: Mapping[str, str], home: Path) -> bool:
@@ -80,6 +81,8 @@ def _start_here() -> None:
 
     Raises Exception, as Ray does.
     """
+    # Ray's own 15 gives its processes hardly any time beside others: a killed shard was away for minutes.
+    os.environ.setdefault(NICENESS, str(os.getpriority(os.PRIO_PROCESS, 0)))
     before = children()
     for start in range(1, STARTS_MAX + 1):
         try:
