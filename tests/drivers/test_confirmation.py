@@ -9,18 +9,22 @@ import pytest
 
 from roboglot.clients.slamware import SlamwareRefused
 from roboglot.confirmation import Confirmation, confirm, confirmed
+from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.interaction.armor import Armor
 from roboglot.model.components.interaction.blaster import Blaster
 from roboglot.model.components.interaction.light import Colour, Light
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
 from roboglot.model.components.system.pwm import PwmPorts
 from roboglot.model.errors import Refused, RobotError
 from roboglot.model.geometry import Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
+from roboglot.testing import Forward
+from roboglot.wire.slamware.chapters.motion import Result
 from roboglot.wire.slamware.chapters.slam.localization import NewOrigin
 from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap
 from roboglot.wire.slamware.geometry import Point, Pose3D
@@ -49,6 +53,21 @@ async def test_refused_pose_is_refused_in_front(
     monkeypatch.setattr(robot[Localization], "set_pose", refuse)
     with pytest.raises(SlamwareRefused, match="not now"):
         await front.set_pose(Pose3D(1.0, 0.5, 0.0, 0.0))
+
+
+@pytest.mark.world("empty", body="hermes")
+async def test_refused_pose_ends_the_action_for_it(
+    driven: Robot, robot: Robot, rest: OpenRest, forward: Forward, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The action had succeeded, for it did not wait for the robot's answer."""
+    front = await rest(driven)
+    assert driven[DockContact].docked
+    driven[Docking].set_home(driven[Localization].pose)
+    monkeypatch.setattr(robot[Localization], "set_pose", refuse)
+    action = await front.begin("ManualRelocalizationAction", None)
+    await forward(seconds=1)
+    state = await action.look()
+    assert (state.result, state.reason) == (Result.FAILED, "operation fail: not now")
 
 
 @pytest.mark.world("empty", body="hermes")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from roboglot.confirmation import confirmed
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_library import MapLibrary
 from roboglot.model.components.motion.docking import Docking
@@ -82,7 +83,8 @@ async def initialize_position(
 ) -> str:
     """Set the robot's pose in its map."""
     if mapId == context.map_id:
-        context.robot[Localization].set_pose(Pose(x, y, theta))
+        async with confirmed():
+            context.robot[Localization].set_pose(Pose(x, y, theta))
     elif MapLibrary not in context.robot or mapId not in await context.robot[MapLibrary].names():
         raise InvalidGoal(f"there is no map {mapId!r}; the robot's map is {context.map_id!r}")
     elif context.book.nodes:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from roboglot.confirmation import confirmed
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.logistics.lift_client import LiftClient
 from roboglot.model.components.mapping.floors import Floors
@@ -130,7 +131,8 @@ async def change_floor(context: Context, errand: Errand, floor: FloorMap) -> Non
     if floor.name != maps.current:
         await maps.enter(floor.name.building, floor.name.floor, landing.waiting())
     elif robot[Localization].lost is not None:
-        robot[Localization].set_pose(landing.waiting())
+        async with confirmed():
+            robot[Localization].set_pose(landing.waiting())
 
 
 def shared_elevators(robot: Robot, floor: FloorMap) -> list[tuple[Elevator, Elevator]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from roboglot.confirmation import confirmed
 from roboglot.model.actions import Action
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.mapping.localization import Localization, Region
@@ -64,7 +65,8 @@ def manual_relocalization(context: Context, _: NoOptions) -> Action:
                 return
             except (NotLocalized, Expired):
                 await robot.clock.sleep(PAUSE_SECONDS)
-        robot[Localization].set_pose(dock.pose)
+        async with confirmed():
+            robot[Localization].set_pose(dock.pose)
         context.events.note(GeneralEvent.RESET_MAP_TO_DOCK)
 
     return run_errand(context.robot, "manual relocalization", work)
