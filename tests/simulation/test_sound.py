@@ -103,7 +103,7 @@ async def test_the_microphone_hears_claps_in_the_world(simulate):
 async def test_a_robot_hears_what_another_one_plays(simulate):
     run = simulate("empty", start=Pose(5, 5), robots=("a", "b"))
     other = run.robots["b"][Speaker]
-    other.set_volume(1.0)
+    await other.set_volume(1.0)
     other.play(tone(1000, 0.5))
     wave = np.concatenate([block.samples for block in await taken_down(run, 0.4)]).astype(float)
     peak = np.fft.rfftfreq(len(wave), 1 / SAMPLE_RATE)[np.abs(np.fft.rfft(wave)).argmax()]
@@ -191,8 +191,8 @@ async def test_invalid_texts_and_volumes_are_refused(simulate):
             speaker.say(text)
     for volume in (-0.1, 1.1, math.nan):
         with pytest.raises(InvalidGoal):
-            speaker.set_volume(volume)
-    speaker.set_volume(0.25)
+            await speaker.set_volume(volume)
+    await speaker.set_volume(0.25)
     assert speaker.volume == 0.25
 
 

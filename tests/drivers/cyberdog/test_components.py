@@ -134,7 +134,7 @@ async def test_it_speaks_as_loudly_as_asked(driven: Robot, robot: Robot) -> None
     speaker, said = driven[Speaker], list[str]()
     robot.events.listen(Spoke, lambda event: said.append(event.text))
     async with asyncio.timeout(PATIENCE):
-        speaker.set_volume(0.35)
+        await speaker.set_volume(0.35)
         while speaker.volume != pytest.approx(0.35):
             await driven.clock.sleep(0.05)
         assert robot[Speaker].volume == pytest.approx(0.35)

@@ -6,10 +6,11 @@ import pytest
 
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.interaction.speaker import Speaker
 from roboglot.model.components.interaction.training_words import REPEATS, TrainingWords
 from roboglot.model.components.sensing.hearing import Hearing
 from roboglot.model.components.sensing.vision import Vision
-from roboglot.model.events import Spoke
+from roboglot.model.events import ActionChanged, Spoke
 from roboglot.model.geometry import Pose
 from roboglot.model.perception import Emotion, Gesture, Sport
 from roboglot.programs.functions.enums import ENUMS, GESTURES
@@ -135,6 +136,25 @@ async def test_a_whole_training_with_words(caller: Caller, anna: Actor) -> None:
         texts = [(await said.next()).text for _ in range(3)]
     assert field(result, "response").fields.items() >= {"result": 0, "algo_switch": 1, "counts": 2}.items()
     assert texts == ["1", "2", "done"]
+
+
+async def test_interrupted_words_fail_no_training(caller: Caller, anna: Actor) -> None:
+    """The training failed where another client spoke at the same time."""
+    speaker = caller.robot[Speaker]
+
+    def interrupt(event: ActionChanged) -> None:
+        if event.action.status is ActionStatus.EXECUTING and event.action.goal == "time is up":
+            speaker.say("good evening", source="another")
+
+    caller.robot.events.listen(ActionChanged, interrupt)
+    result = await caller("cyberdog.skeleton.sports_recognition", 1, 2, 5)
+    assert (field(result, "state.code"), field(result, "response.algo_switch")) == (0, 2)
+
+
+async def test_refused_training_leaves_the_volume(caller: Caller) -> None:
+    before = caller.robot[Speaker].volume
+    result = await caller("cyberdog.skeleton.sports_recognition", 1, 0, 5, True, True, 90)
+    assert (field(result, "state.code"), caller.robot[Speaker].volume) == (1, before)
 
 
 @pytest.mark.parametrize("interact", [True, False])

@@ -21,6 +21,7 @@ from roboglot.model.sensing import BatteryState
 from roboglot.model.sound import Sound
 from roboglot.programs.functions.audio import bark
 from roboglot.programs.functions.enums import ENUMS
+from roboglot.simulation.world.world import World
 from tests.programs.functions.calling import Caller, field
 
 pytestmark = pytest.mark.world("empty", body="cyberdog2")
@@ -177,7 +178,7 @@ async def test_music_is_heard_to_its_end(caller: Caller, number: int, piece: Cal
     [
         ("play", ("hello", 101)),
         ("play", ("",)),
-        ("play", ("x" * 1001,)),
+        ("play", ("x" * 1001, 35)),
         ("offline_play", (6002,)),
         ("offline_play", (4000, -2)),
     ],
@@ -198,6 +199,14 @@ async def test_volume(caller: Caller) -> None:
         result = await caller("cyberdog.audio.set_volume", volume)
         assert field(result, "response.success") is success
     assert speaker.volume == 0.55
+
+
+async def test_volume_on_a_full_disk_is_refused(caller: Caller, world: World) -> None:
+    before = caller.robot[Speaker].volume
+    world.faults.inject("full_disk", "a")
+    assert field(await caller("cyberdog.audio.set_volume", 35), "response.success") is False
+    assert field(await caller("cyberdog.audio.play", "hello", 35), "response.status") == 1
+    assert caller.robot[Speaker].volume == before
 
 
 async def test_without_a_loudspeaker(bare_caller: Caller) -> None:

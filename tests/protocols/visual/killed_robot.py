@@ -47,10 +47,7 @@ class Recorder(Speaker):
 
     volume = 1.0
 
-    def set_volume(self, volume: float) -> None:
-        raise NotImplementedError
-
-    async def store_volume(self, volume: float) -> None:
+    async def set_volume(self, volume: float) -> None:
         raise NotImplementedError
 
     def say(self, text: str, *, source: str = "") -> Action:

@@ -225,4 +225,4 @@ async def say(robot: Robot, *, text: Text) -> Started:
 @VERBS.on("volume", needs=(Speaker,))
 async def volume(robot: Robot, *, to: Annotated[float, msgspec.Meta(ge=0, le=1)]) -> None:
     """Set the loudspeaker, 0 silent to 1 loudest."""
-    robot[Speaker].set_volume(to)
+    await robot[Speaker].set_volume(to)

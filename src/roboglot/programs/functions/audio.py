@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping
 from functools import cache
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from roboglot.media.tunes import evening_waltz, romp
 from roboglot.model.actions import Action
-from roboglot.model.components.interaction.speaker import SPEAKER, Speaker
+from roboglot.model.components.interaction.speaker import SPEAKER, Speaker, check_text
 from roboglot.model.errors import InvalidGoal, NotFound, RobotError
 from roboglot.model.sound import SAMPLE_RATE, Sound
 from roboglot.programs.functions.results import StateCode, state
@@ -17,6 +18,7 @@ from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
+log = logging.getLogger(__name__)
 PLAYED, FAILED = 0, 1  # AudioPlaySeviceResponse.response.status
 UNCHANGED = -1
 BARKS = {4000: 620.0, 4001: 260.0}  # Hz of their first tone
@@ -38,13 +40,13 @@ async def offline_play(session: Session, audio_id: int = 4000, volume: int = UNC
 @ABILITIES.on("cyberdog.audio.instantly_play", needs=(Speaker,))
 async def instantly_play(session: Session, message: str, volume: int = UNCHANGED) -> Record:
     """Say ``message`` now, in place of anything being said; returns at once. Speech ends with the program."""
-    return _started(session, message, volume)
+    return await _started(session, message, volume)
 
 
 @ABILITIES.on("cyberdog.audio.offline_instantly_play", needs=(Speaker,))
 async def offline_instantly_play(session: Session, audio_id: int = 4000, volume: int = UNCHANGED) -> Record:
     """Play a bark (4000, 4001) or music (6000, 6001) now, in place of any other; ends with the task."""
-    return _started(session, audio_id, volume)
+    return await _started(session, audio_id, volume)
 
 
 @ABILITIES.on("cyberdog.audio.get_volume", needs=(Speaker,))
@@ -60,17 +62,17 @@ async def set_volume(session: Session, volume: int = UNCHANGED) -> Record:
     """Set the volume of all speech from now on."""
     outcome = state()
     try:
-        turn_to(session.robot[Speaker], volume)
+        await turn_to(session.robot[Speaker], volume)
     except RobotError as error:
         outcome = state(StateCode.FAIL, str(error))
     body = Record("AudioSetVolumeSeviceResponseBody", {"success": outcome.fields["code"] == StateCode.SUCCESS})
     return Record("AudioSetVolumeSeviceResponse", {"state": outcome, "response": body})
 
 
-def turn_to(speaker: Speaker, volume: int) -> None:
-    """Set the volume, percent; -1 changes nothing. Raises InvalidGoal beyond 0 to 100."""
+async def turn_to(speaker: Speaker, volume: int) -> None:
+    """Set and store the volume, percent; -1 changes nothing. Raises InvalidGoal beyond 0 to 100."""
     if volume != UNCHANGED:
-        speaker.set_volume(usable_volume(volume) / 100)
+        await speaker.set_volume(usable_volume(volume) / 100)
 
 
 def usable_volume(volume: int) -> int:
@@ -85,7 +87,15 @@ async def say(session: Session, what: str | int, volume: int = UNCHANGED) -> Non
     for other in session.robot.actions.running(SPEAKER):
         await other.done()
     await session.unpaused()
-    await session.complete(_begin(session, what, volume))
+    await session.complete(await _begin(session, what, volume))
+
+
+async def comment(session: Session, what: str) -> None:
+    """Say how it goes; another client that speaks in between does not make it go worse."""
+    try:
+        await say(session, what)
+    except RobotError as error:
+        log.info("%s: cannot say %r: %s", session.source, what, error)
 
 
 async def _played(session: Session, what: str | int, volume: int) -> Record:
@@ -98,20 +108,22 @@ async def _played(session: Session, what: str | int, volume: int) -> Record:
     return Record("AudioPlaySeviceResponse", {"state": outcome, "response": body})
 
 
-def _started(session: Session, what: str | int, volume: int) -> Record:
+async def _started(session: Session, what: str | int, volume: int) -> Record:
     try:
-        _begin(session, what, volume)
+        await _begin(session, what, volume)
     except RobotError as error:
         return state(StateCode.FAIL, str(error))
     return state()
 
 
-def _begin(session: Session, what: str | int, volume: int) -> Action:
+async def _begin(session: Session, what: str | int, volume: int) -> Action:
     """Start saying a text, or playing the sound of a number."""
     speaker = session.robot[Speaker]
     if isinstance(what, int) and what not in BARKS.keys() | PIECES.keys():
         raise NotFound(f"there is no sound {what}; there are: {', '.join(map(str, [*BARKS, *PIECES]))}")
-    turn_to(speaker, volume)
+    if isinstance(what, str):
+        check_text(what)  # before the volume changes
+    await turn_to(speaker, volume)
     if isinstance(what, int):
         sound = PIECES[what]() if what in PIECES else bark(what)
         return speaker.play(sound, source=session.source)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 import msgspec
@@ -112,7 +112,7 @@ class Parameter:
     read: Callable[[Robot], object]
     needs: type | None = None
     kind: type = str
-    write: Callable[[Robot, Any], None] | None = None
+    write: Callable[[Robot, Any], Awaitable[None] | None] | None = None
     right: Right = Right.EDIT
 
 

@@ -34,11 +34,7 @@ class Speaker(Component):
         """Volume from 0 (silent) to 1 (loudest)."""
 
     @abstractmethod
-    def set_volume(self, volume: float) -> None:
-        """Set the volume, without waiting until it is stored. Raises InvalidGoal unless 0..1."""
-
-    @abstractmethod
-    async def store_volume(self, volume: float) -> None:
+    async def set_volume(self, volume: float) -> None:
         """Set the volume; return once it is stored. Raises InvalidGoal unless 0..1."""
 
     @abstractmethod

@@ -19,7 +19,7 @@ from roboglot.model.geometry import Point
 from roboglot.model.map_loading import known_dock, load_map
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Robot
-from roboglot.programs.functions.audio import say, turn_to, usable_volume
+from roboglot.programs.functions.audio import comment, turn_to, usable_volume
 from roboglot.programs.functions.results import StateCode, state
 from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
@@ -200,7 +200,7 @@ async def _find_itself(session: Session, stored: StoredMap, assisted: bool, inte
                 raise
         if interact and clock.time() - asked >= ASKED_EVERY:
             asked = clock.time()
-            await say(session, REQUEST)
+            await comment(session, REQUEST)
         await session.sleep(max(0.0, 1.0 - (clock.time() - began)))
 
 
@@ -221,7 +221,7 @@ async def _with_words(session: Session, doing: Coroutine[object, object, None], 
     try:
         usable_volume(volume)
         if interact:
-            turn_to(session.robot[Speaker], volume)
+            await turn_to(session.robot[Speaker], volume)
     except RobotError:
         doing.close()
         raise
@@ -231,7 +231,7 @@ async def _with_words(session: Session, doing: Coroutine[object, object, None], 
         words = "navigation succeeded"
     finally:
         if interact:
-            await say(session, words)
+            await comment(session, words)
 
 
 async def _outcome(doing: Coroutine[object, object, None]) -> Record:

@@ -11,7 +11,7 @@ from roboglot.model.errors import InvalidGoal, Refused, RobotError
 from roboglot.model.feed import Viewer
 from roboglot.model.perception import Sighting, SkeletonSeen, Sport
 from roboglot.model.sports import SportCounter
-from roboglot.programs.functions.audio import say, turn_to, usable_volume
+from roboglot.programs.functions.audio import comment, turn_to, usable_volume
 from roboglot.programs.functions.results import StateCode, state
 from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
@@ -145,18 +145,18 @@ async def sports_recognition(
     watch = session.part(ExerciseWatch)
     try:
         usable_volume(volume)
-        if interact:
-            turn_to(session.robot[Speaker], volume)
         watch.open(sport_type, counts, timeout)
+        if interact:
+            await turn_to(session.robot[Speaker], volume)
         while watch.progress[0] is Switch.OPEN:
             if await _change(session, watch, timeout) and interact:
                 number = str(watch.progress[2] or watch.progress[3])
                 if instantly:
                     session.robot[Speaker].say(number, source=session.source)
                 else:
-                    await say(session, number)
+                    await comment(session, number)
         if interact:
-            await say(session, "done" if watch.progress[0] is Switch.COMPLETE else "time is up")
+            await comment(session, "done" if watch.progress[0] is Switch.COMPLETE else "time is up")
     except RobotError as error:
         watch.close()
         return _sports(session, state(StateCode.FAIL, str(error)), FAILED)

@@ -35,7 +35,7 @@ async def set_parameters(context: Context, *, parameters: list[Value], id: str |
     names = _checked([value.name for value in parameters])
     try:
         for value in parameters:
-            _set(context.robot, value)
+            await _set(context.robot, value)
     finally:
         if id is not None:
             context.send(message("parameterValues", parameters=_present(context.robot, names), id=id))
@@ -68,7 +68,7 @@ def _present(robot: Robot, names: list[str]) -> list[dict[str, object]]:
     return parameters(robot, names) if names else []
 
 
-def _set(robot: Robot, value: Value) -> None:
+async def _set(robot: Robot, value: Value) -> None:
     parameter: Parameter | None = PARAMETERS.get(value.name)
     if parameter is None:
         raise NotFound(f"there is no parameter {value.name[:80]!r}")
@@ -79,4 +79,5 @@ def _set(robot: Robot, value: Value) -> None:
         wanted: object = msgspec.convert(value.value, parameter.kind)
     except msgspec.ValidationError:
         raise InvalidGoal(f"{value.name} is {'a number' if parameter.kind is float else 'true or false'}") from None
-    parameter.write(robot, wanted)
+    if (storing := parameter.write(robot, wanted)) is not None:
+        await storing

@@ -39,7 +39,6 @@ class SimulatedSpeaker(Speaker):
     def __init__(self, section: SpeakerSection, hull: Hull, air: SoundField, robot: Robot) -> None:
         self._loudness, self._hull, self._air, self._robot = section.loudness, hull, air, robot
         self._volume: float | None = None
-        self._keeping: asyncio.Task[None] | None = None
 
     @property
     def volume(self) -> float:
@@ -48,13 +47,7 @@ class SimulatedSpeaker(Speaker):
             self._volume = float(kept)
         return self._volume
 
-    def set_volume(self, volume: float) -> None:
-        check_volume(volume)
-        self._volume = volume
-        if Settings in self._robot:
-            self._keeping = asyncio.get_running_loop().create_task(self._robot[Settings].keep(VOLUME, volume))
-
-    async def store_volume(self, volume: float) -> None:
+    async def set_volume(self, volume: float) -> None:
         check_volume(volume)
         if Settings in self._robot:
             await self._robot[Settings].put(VOLUME, volume)

@@ -29,16 +29,7 @@ class CyberDogSpeaker(Speaker):
     def volume(self) -> float:
         return (self._status.volume or 0) / 100
 
-    def set_volume(self, volume: float) -> None:
-        check_volume(volume)
-
-        async def change() -> None:
-            await self._client.set_volume(round(volume * 100))
-            await self._status.ask()
-
-        self._supervisor.send("setting the volume", change())
-
-    async def store_volume(self, volume: float) -> None:
+    async def set_volume(self, volume: float) -> None:
         check_volume(volume)
         self._supervisor.link.require()
         with robot_errors():

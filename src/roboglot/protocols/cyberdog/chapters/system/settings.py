@@ -55,7 +55,7 @@ async def set_volume(call: Call, *, volume: Int32) -> dict[str, bool]:
     """Set the volume, 0 (silent) to 100; true once it is stored."""
     if not 0 <= volume <= 100:
         return call.refused({"success": False}, "volume is 0 to 100")
-    await call.context.robot[Speaker].store_volume(volume / 100.0)
+    await call.context.robot[Speaker].set_volume(volume / 100.0)
     return {"success": True}
 
 
