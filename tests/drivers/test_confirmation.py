@@ -12,12 +12,15 @@ from roboglot.confirmation import Confirmation, confirm, confirmed
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.interaction.armor import Armor
 from roboglot.model.components.interaction.blaster import Blaster
+from roboglot.model.components.interaction.input_device import InputDevice
 from roboglot.model.components.interaction.light import Colour, Light
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
+from roboglot.model.components.sensing.hearing import Hearing
+from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.components.system.pwm import PwmPorts
 from roboglot.model.errors import Refused, RobotError
 from roboglot.model.geometry import Pose
@@ -103,6 +106,22 @@ async def test_refused_mode_fails_also_when_repeated(
     for _ in range(3):  # repeated lines may take a shorter way
         assert await client.ask("robot mode free;") == "fail"
         assert await client.ask("robot mode ?;") == "gimbal_lead"
+
+
+@pytest.mark.world("empty", body="robomaster_ep")
+@pytest.mark.parametrize("line", ["AI push marker on", "sound event applause on", "game_msg on"])
+async def test_refused_pushes_are_refused_again(
+    driven_ep: Robot, robot: Robot, text_door: Open, monkeypatch: pytest.MonkeyPatch, line: str
+) -> None:
+    """The second time, the answer was "ok", as if they were on already."""
+    client = await text_door(driven_ep)
+    with monkeypatch.context() as busy:
+        busy.setattr(robot[Vision].markers, "subscribe", refuse)
+        busy.setattr(robot[Hearing], "claps", refuse)
+        busy.setattr(robot[InputDevice], "listen", refuse)
+        for _ in range(3):
+            assert await client.ask(f"{line};") == "fail"
+    assert await client.ask(f"{line};") == "ok"
 
 
 @pytest.mark.world("empty", body="hermes")

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from roboglot.model.errors import Busy
+from roboglot.model.errors import Busy, Refused
 from roboglot.model.feed import VIEWERS_MAX, Feed
 
 
@@ -86,3 +86,19 @@ async def test_viewers_are_limited():
         source.feed.subscribe()
     with pytest.raises(Busy):
         source.feed.subscribe()
+
+
+def test_failed_begin_is_tried_again() -> None:
+    begun = iter([Refused("no link"), None])
+
+    def begin() -> None:
+        if (error := next(begun)) is not None:
+            raise error
+
+    feed: Feed[int] = Feed(begin, lambda: None, queue_max=1)
+    with pytest.raises(Refused):
+        feed.subscribe()
+    with feed.subscribe() as viewer:
+        feed.push(1)
+        assert viewer.drain() == [1]
+    assert next(begun, "none left") == "none left"

@@ -101,13 +101,17 @@ class Feed(Generic[T]):
         return all(viewer.waiting for viewer in self._viewers)
 
     def subscribe(self) -> Viewer[T]:
-        """Return a new viewer. Raises Busy beyond VIEWERS_MAX."""
+        """Return a new viewer. Raises Busy beyond VIEWERS_MAX, and what ``begin`` raises."""
         if len(self._viewers) >= VIEWERS_MAX:
             raise Busy(f"{VIEWERS_MAX} viewers already")
         viewer = Viewer(self, self._queue_max)
         self._viewers.append(viewer)
         if len(self._viewers) == 1:
-            self._begin()
+            try:
+                self._begin()
+            except BaseException:  # else further viewers would wait for what never began
+                self._viewers.remove(viewer)
+                raise
         return viewer
 
     def push(self, item: T) -> None:

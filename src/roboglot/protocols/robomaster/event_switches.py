@@ -9,6 +9,8 @@ from roboglot.model.components.interaction.armor import Armor
 from roboglot.model.components.sensing.adapter import SensorAdapters
 from roboglot.model.components.sensing.hearing import Hearing
 from roboglot.model.events import AdapterLevelChanged, ArmorHit
+from roboglot.model.feed import Viewer
+from roboglot.model.perception import ClapsHeard
 from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.vocabulary import ARMOR, HITS
 
@@ -58,11 +60,17 @@ class EventSwitches:
         self._send(f"sensor_adapter event io_level ({change.adapter}, {change.port}, {int(change.level)})")
 
     def _listen(self) -> Callable[[], object]:
-        task = asyncio.get_running_loop().create_task(self._applaud(), name="sound event")
-        return task.cancel
+        runs = self._robot[Hearing].claps()  # now, so that this request is refused if a real robot refuses
+        task = asyncio.get_running_loop().create_task(self._applaud(runs), name="sound event")
 
-    async def _applaud(self) -> None:
-        with self._robot[Hearing].claps() as runs:
+        def stop() -> None:
+            task.cancel()
+            runs.close()
+
+        return stop
+
+    async def _applaud(self, runs: Viewer[ClapsHeard]) -> None:
+        with runs:
             async for heard in runs:
                 if heard.count >= CLAPS_MIN:
                     self._send(f"sound event applause {heard.count}")

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from typing import Any
 
 from roboglot.model.components.sensing.detector import Detector
 from roboglot.model.components.sensing.vision import Vision
-from roboglot.model.errors import InvalidGoal, Refused
-from roboglot.model.perception import Box, GestureSeen, LineSeen, MarkerSeen, PersonSeen, RobotSeen
+from roboglot.model.errors import InvalidGoal, Refused, RobotError
+from roboglot.model.feed import Viewer
+from roboglot.model.perception import Box, GestureSeen, LineSeen, MarkerSeen, PersonSeen, RobotSeen, Sighting
 from roboglot.operations import Right
 from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.limits import TARGETS_MAX
 from roboglot.protocols.robomaster.ranges import LineColour, MarkerColour, MarkerDistance, OnOff
+from roboglot.protocols.robomaster.switching import switch_or_undo
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.protocols.robomaster.vocabulary import GESTURES, MARKERS
 from roboglot.wire.robomaster.replies import Number
@@ -32,7 +33,7 @@ class Ai:
 
     def __init__(self, context: Context) -> None:
         self._context, self._robot = context, context.robot
-        self._open: dict[str, contextlib.ExitStack] = {}
+        self._open: dict[str, Viewer[Sighting[object]]] = {}
         self._reported: dict[str, float] = {}
         self._task: asyncio.Task[None] | None = None
         self.line_colour: str | None = None  # None: any
@@ -45,25 +46,37 @@ class Ai:
         for group in GROUPS:
             if len(rivals := [name for name in group if name in after]) > 1:
                 raise Refused(f"{' and '.join(rivals)} exclude each other; switch one off")
-        vision = self._robot[Vision]
-        for name, on in wanted.items():
-            if on and name not in self._open:
-                self._open[name] = contextlib.ExitStack()
-                self._open[name].enter_context(_detector(vision, name).subscribe())
-            elif not on and name in self._open:
-                self._open.pop(name).close()
+        before = self.kinds
+        try:
+            self._watch(after)
+        except RobotError:
+            self._watch(before)
+            raise
         if self._open and self._task is None:
             self._task = asyncio.get_running_loop().create_task(self._push(), name="push AI")
         elif not self._open:
             self.reset()
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Kinds that are on."""
+        return frozenset(self._open)
+
+    def _watch(self, kinds: Set[str]) -> None:
+        """Watch for these kinds, and no others; those that are over end first, as they may exclude new ones."""
+        vision = self._robot[Vision]
+        for name in self.kinds - kinds:
+            self._open.pop(name).close()
+        for name in kinds - self.kinds:
+            self._open[name] = _detector(vision, name).subscribe()
 
     def reset(self) -> None:
         """Switch everything off; colours and distance stay until the session ends."""
         if self._task:
             self._task.cancel()
             self._task = None
-        for stack in self._open.values():
-            stack.close()
+        for viewer in self._open.values():
+            viewer.close()
         self._open.clear()
 
     async def _push(self) -> None:
@@ -156,7 +169,7 @@ def set_attribute(
 
 
 @TABLE.on("AI push", right=Right.SEE, needs=(Vision,))
-def push(
+async def push(
     context: Context,
     *,
     person: OnOff | None = None,
@@ -175,4 +188,7 @@ def push(
     if {person, people} == {"on", "off"} or {gesture, pose} == {"on", "off"}:
         raise InvalidGoal("the same attribute is on and off")
     context.robot.require(Vision)
-    context.part(Ai).switch({name: word == "on" for name, word in words.items() if word})
+    ai = context.part(Ai)
+    before = {name: name in ai.kinds for name in WORDED}
+    wanted = {name: word == "on" for name, word in words.items() if word}
+    await switch_or_undo(lambda: ai.switch(wanted), lambda: ai.switch(before))

@@ -9,6 +9,7 @@ from roboglot.model.components.interaction.input_device import Input, InputDevic
 from roboglot.operations import Right
 from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.limits import KEYS_MAX
+from roboglot.protocols.robomaster.switching import switch_or_undo
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.wire.robomaster.telemetry import KEYS_AND_MOUSE
 
@@ -60,10 +61,11 @@ class GamePushes:
 
 
 @TABLE.on("game_msg on", right=Right.SEE, needs=(InputDevice,))
-def game_on(context: Context) -> None:
+async def game_on(context: Context) -> None:
     """Push keys and mouse (3.2.20.1)."""
     context.robot.require(InputDevice)
-    context.part(GamePushes).switch(True)
+    pushes = context.part(GamePushes)
+    await switch_or_undo(lambda: pushes.switch(True), lambda: pushes.switch(False))
 
 
 @TABLE.on("game_msg off", right=Right.SEE)
