@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from roboglot.confirmation import confirmed
 from roboglot.model.components.mapping.floors import Floors
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
@@ -60,9 +61,9 @@ class Maps:
             raise NotFound(f"there is no version {version!r}: maps here have none, mapVersion is empty")
         return await self._robot[MapLibrary].get(name)
 
-    def use(self, stored: StoredMap, pose: Pose) -> None:
+    async def use(self, stored: StoredMap, pose: Pose) -> None:
         """Use a map from now on, with the robot at ``pose`` in it. Raises the errors of ``Mapping.load``."""
-        self._load(stored, pose)
+        await self._load(stored, pose)
         self._used = stored.name
 
     async def change(self, stored: StoredMap) -> None:
@@ -71,7 +72,7 @@ class Maps:
         grid, pose = robot[Mapping].grid, robot[Localization].pose
         copied = OccupancyGrid(grid.log_odds.copy(), grid.resolution, grid.origin)
         before = StoredMap(self.in_use, copied, 0.0, dock=known_dock(robot))
-        self._load(stored, pose)
+        await self._load(stored, pose)
         try:
             action = robot[Localization].relocalize(source="vda5050")
             try:
@@ -79,7 +80,7 @@ class Maps:
             finally:
                 action.cancel("fleet control cancelled it")
         except BaseException:
-            self._load(before, pose)
+            await self._load(before, pose)
             raise
         self._used = stored.name
 
@@ -96,10 +97,11 @@ class Maps:
         states = {name: "ENABLED" if name == self.in_use else "DISABLED" for name in names}
         return {"maps": [{"mapId": name, "mapVersion": "", "mapStatus": status} for name, status in states.items()]}
 
-    def _load(self, stored: StoredMap, pose: Pose) -> None:
+    async def _load(self, stored: StoredMap, pose: Pose) -> None:
         self._loads += 1
         try:
-            load_map(self._robot, stored, pose)
+            async with confirmed():
+                load_map(self._robot, stored, pose)
         except BaseException:
             self._loads -= 1
             raise

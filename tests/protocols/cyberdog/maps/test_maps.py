@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
+from roboglot.confirmation import confirm
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.docking import Docking
+from roboglot.model.errors import Refused
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Robot
@@ -108,6 +111,27 @@ async def test_in_map_of_earlier_life_robot_is_searched(client, door, robot, wor
     assert (await client.ask(6003))["mapName"] == "old"
     believed, there = begun.compose(robot[Localization].pose), world.truth.pose_of("a")
     assert believed.distance_to(there) < 0.15
+
+
+async def test_refused_map_is_not_the_one_in_use(client, robot, forward, passing: Passing, monkeypatch) -> None:
+    """A real robot that refuses a map was localized in the one in memory instead."""
+
+    async def refusal() -> Exception:
+        return Refused("not now")
+
+    def refuse(*_: object) -> None:
+        confirm(asyncio.get_running_loop().create_task(refusal()))
+
+    await forward(seconds=2)
+    grid, load = robot[Mapping].grid, robot[Mapping].load
+    await robot[MapLibrary].put(StoredMap("old", grid, 0.0))
+    loaded: list[object] = []
+    for loads, result in ((refuse, 3), (lambda *given: loaded.append(load(*given)), 0)):
+        monkeypatch.setattr(robot[Mapping], "load", loads)
+        stream = Stream(client, 6004, {"type": 7})
+        await passing(lambda it=stream: it.ended)
+        assert stream.answers[-1] == {"result": result}
+    assert loaded == [None]
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from roboglot.confirmation import confirmed
 from roboglot.model.components.interaction.speaker import Speaker
 from roboglot.model.components.mapping.localization import GOOD_FIT, Localization
 from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
@@ -170,12 +171,14 @@ async def _turn_on(session: Session, outdoor: bool, assisted: bool, interact: bo
     if not same_origin(stored.grid, mapping.grid):
         was, pose = mapping.grid, localization.pose
         home = known_dock(robot)
-        load_map(robot, stored, pose)
+        async with confirmed():
+            load_map(robot, stored, pose)
         try:
             await _find_itself(session, stored, assisted, interact)
         except RobotError:
             if was.width:
-                load_map(robot, replace(stored, grid=was, dock=home), pose)
+                async with confirmed():
+                    load_map(robot, replace(stored, grid=was, dock=home), pose)
             raise
     elif localization.quality < GOOD_FIT:
         await _find_itself(session, stored, assisted, interact)

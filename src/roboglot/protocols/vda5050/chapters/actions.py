@@ -90,7 +90,7 @@ async def initialize_position(
     elif context.book.nodes:
         raise Refused(f"order {context.book.order_id} is being driven in {context.map_id!r}")
     else:
-        context.maps.use(await context.maps.kept(mapId, ""), Pose(x, y, theta))
+        await context.maps.use(await context.maps.kept(mapId, ""), Pose(x, y, theta))
     context.book.place_at(lastNodeId, 0)
     return ""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from contextlib import suppress
 
+from roboglot.confirmation import confirmed
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.mapping.localization import GOOD_FIT, Localization, Region
 from roboglot.model.components.mapping.mapping import Mapping
@@ -54,7 +55,8 @@ async def relocalize(context: Context, task: Task, *, outdoor: bool) -> TaskResu
     stored = await newest_map(context, outdoor=outdoor)
     other = stored is not None and stored.name != context.stored_map  # saved by an earlier run of the program
     if stored is not None and other and stored.grid.width * stored.grid.height > 0:
-        load_map(robot, stored, Pose())
+        async with confirmed():
+            load_map(robot, stored, Pose())
         context.stored_map = stored.name
     # Without a stored map the one in memory serves, unless it is of the other kind or was deleted.
     if not await _has_begun_map(robot) or (stored is None and (outdoor or context.stored_map or context.map_deleted)):

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from roboglot.model.components.interaction.members import Members
 from roboglot.model.components.interaction.speaker import Speaker
 from roboglot.model.components.sensing.hearing import Hearing
-from roboglot.model.errors import RobotError
+from roboglot.model.errors import NotFound, RobotError
 from roboglot.model.events import MembersChanged
 from roboglot.model.perception import SpeechHeard
 from roboglot.model.robot import Robot
@@ -108,7 +108,7 @@ class Voice:
             code = TIMEOUT
         except RobotError as error:
             log.info("cannot learn the voice of %r: %s", member, error)
-            code = UNKNOWN
+            code = UNKNOWN if isinstance(error, NotFound) else FAILED
         finally:
             if self._learning is asyncio.current_task():  # unless it was cancelled
                 self._learning = None
