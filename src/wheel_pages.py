@@ -1,4 +1,4 @@
-"""The build step of wheels: stores pages and tables compressed, as ``roboglot.text_files.content_of`` reads them.
+"""The build step of wheels: stores texts of the package compressed, as ``roboglot.text_files.content_of`` reads them.
 
 Loaded by setuptools alone, before the package is there: it imports nothing of it.
 """
@@ -16,9 +16,10 @@ FOLDERS = (
     "roboglot/console/web",
     "roboglot/protocols/slamware/page",
     "roboglot/simulation",
+    "roboglot/storage/schema",
     "roboglot/wire/contracts",
 )
-TEXTS = {".html", ".js", ".css", ".json", ".svg", ".toml"}
+TEXTS = {".html", ".js", ".css", ".json", ".sql", ".svg", ".toml"}
 
 
 class BuildPackage(build_py):  # type: ignore[misc]

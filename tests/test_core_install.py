@@ -109,6 +109,7 @@ def test_pages_in_a_wheel_equal_the_sources(core: Path) -> None:
         "console/studio/labels.toml",
         "protocols/slamware/page/page.js",
         "simulation/worlds/office.toml",
+        "storage/schema/v1.sql",
         "wire/contracts/slamware.json",
     ],
 )

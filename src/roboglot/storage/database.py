@@ -20,6 +20,7 @@ from typing import Any, TypeVar
 
 from roboglot.model.components.system.disk import Disk
 from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseError, DiskFull
+from roboglot.text_files import content_of
 
 T = TypeVar("T")
 Work = Callable[[Connection], object]
@@ -255,13 +256,18 @@ def newest_tables(schema: str = ROBOTS) -> tuple[str, ...]:
         return (*(line for line in connection.iterdump() if line not in TRANSACTION), version)
 
 
+def schema_versions(files: Path) -> list[int]:
+    """Return the versions that a folder of schema files leads to."""
+    return sorted(int(m[1]) for f in files.iterdir() if (m := re.fullmatch(r"v(\d+)\.sql(\.gz)?", f.name)))
+
+
 def _migrate(connection: sqlite3.Connection, schema: str, *, in_steps: bool = False) -> None:
     """Apply the schema files that this database has not seen yet; other programs may do so at the same time.
 
     A new database gets the result of all at once, with one flush of the disk; ``in_steps``: it does not.
     """
     files = Path(*import_module(schema).__path__)
-    versions = sorted(int(m[1]) for f in files.iterdir() if (m := re.fullmatch(r"v(\d+)\.sql", f.name)))
+    versions = schema_versions(files)
     while (current := _version(connection)) != versions[-1]:
         if current > versions[-1]:
             raise ValueError(
@@ -283,7 +289,7 @@ def _version(connection: sqlite3.Connection) -> int:
 def _statements(script: Path, version: int) -> Iterator[str]:
     """Yield each statement that leads to ``version``; ``executescript`` would end the transaction."""
     statement = ""
-    for line in script.read_text(encoding="utf-8").splitlines(keepends=True):
+    for line in content_of(script).decode().splitlines(keepends=True):
         statement += line
         if sqlite3.complete_statement(statement):
             yield statement

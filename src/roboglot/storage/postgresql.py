@@ -14,16 +14,19 @@ import re
 import threading
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from importlib import resources
+from importlib import import_module
 from ipaddress import ip_address
+from pathlib import Path
 from typing import Any, TypeVar
 
 import psycopg
 
 from roboglot.hosting.steady_time import uptime
 from roboglot.model.components.system.disk import Disk
+from roboglot.storage.database import schema_versions
 from roboglot.storage.postgresql_connection import LimitedConnection, Patience, close, connect, limited_by
 from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseError, DiskFull, Rows
+from roboglot.text_files import content_of
 from roboglot.transport.log_limiter import LogLimiter
 
 T = TypeVar("T")
@@ -318,13 +321,13 @@ def _migrate(connection: Connection) -> None:
     connection.execute("SELECT pg_advisory_xact_lock(?)", (MIGRATION_LOCK,))
     connection.execute("CREATE TABLE IF NOT EXISTS roboglot_schema (version INTEGER PRIMARY KEY)")
     current = connection.execute("SELECT COALESCE(MAX(version), 0) FROM roboglot_schema").fetchone()[0]
-    files = resources.files("roboglot.storage.schema.postgresql")
-    versions = sorted(int(m[1]) for f in files.iterdir() if (m := re.fullmatch(r"v(\d+)\.sql", f.name)))
+    files = Path(*import_module("roboglot.storage.schema.postgresql").__path__)
+    versions = schema_versions(files)
     if current > versions[-1]:
         raise ValueError(
             f"the database is of version {current}, this program knows up to {versions[-1]}: use a newer one"
         )
     for version in versions:
         if version > current:
-            connection.execute((files / f"v{version}.sql").read_text(encoding="utf-8"))
+            connection.execute(content_of(files / f"v{version}.sql").decode())
             connection.execute("INSERT INTO roboglot_schema (version) VALUES (?)", (version,))

@@ -16,6 +16,7 @@ from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.errors import Refused
+from roboglot.model.events import MapReplaced
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Robot
@@ -122,16 +123,19 @@ async def test_refused_map_is_not_the_one_in_use(client, robot, forward, passing
     def refuse(*_: object) -> None:
         confirm(asyncio.get_running_loop().create_task(refusal()))
 
-    await forward(seconds=2)
-    grid, load = robot[Mapping].grid, robot[Mapping].load
-    await robot[MapLibrary].put(StoredMap("old", grid, 0.0))
-    loaded: list[object] = []
-    for loads, result in ((refuse, 3), (lambda *given: loaded.append(load(*given)), 0)):
-        monkeypatch.setattr(robot[Mapping], "load", loads)
+    async def localized() -> object:
         stream = Stream(client, 6004, {"type": 7})
-        await passing(lambda it=stream: it.ended)
-        assert stream.answers[-1] == {"result": result}
-    assert loaded == [None]
+        await passing(lambda: stream.ended)
+        return stream.answers[-1]
+
+    await forward(seconds=2)
+    await robot[MapLibrary].put(StoredMap("old", robot[Mapping].grid, 0.0))
+    with monkeypatch.context() as refusing:
+        refusing.setattr(robot[Mapping], "load", refuse)
+        assert await localized() == {"result": 3}
+    with robot.events.subscribe(MapReplaced) as replaced:
+        assert await localized() == {"result": 0}
+        assert replaced.drain()
 
 
 @pytest.mark.slow
