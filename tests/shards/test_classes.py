@@ -37,7 +37,7 @@ async def fleet(tmp_path: Path) -> AsyncIterator[Path]:
 @asynccontextmanager
 async def console(folder: Path, *messages: object) -> AsyncIterator[Streams]:
     reader, writer = await asyncio.open_unix_connection(folder / "class")
-    writer.writelines(json.dumps(message).encode() + b"\n" for message in messages)
+    writer.write(b"".join(json.dumps(message).encode() + b"\n" for message in messages))
     yield reader, writer
     writer.transport.abort()
 

@@ -38,6 +38,7 @@ CALLERS_MAX = 1024  # whose names are kept
 CALLS_MAX = 512  # at the same time, over all connections
 CHUNK_SECONDS_MAX = 60.0  # s of real time for a client to take a chunk of a file, up to 4 MB
 WRITE_MAX = 10.0  # s of real time for a client to take a message after its call has ended
+RESUME_MAX = 600.0  # s of real time for a client that was too slow to read on, until its call is given up
 HOST_CALLS_MAX = CALLS_MAX * 3 // 4  # of one host, so that others still reach the robot
 
 
@@ -148,6 +149,7 @@ class Service:
         except NotJson:
             fields = {}
         found = get_file(self._context, host_of(peer), request.nameCode, fields, request.params)
+        late = None
         async with contextlib.aclosing(found) as chunks:
             async for chunk in chunks:
                 if not self._context.robot.admission.may(Right.SEE):  # lost while the file was sent
@@ -155,41 +157,40 @@ class Service:
                     return
                 if tap.watched:
                     tap.reply("cyberdog", str(int(request.nameCode)), chunk.SerializeToString(), "ok", began=began)
-                if not await self._written(rpc, chunk):
-                    log.info("ended a file transfer: %s reads too slowly", host_of(peer))
-                    rpc.set_code(grpc.StatusCode.DEADLINE_EXCEEDED)  # rpc.abort would wait for the client
-                    rpc.set_details("the file was not read in time")
-                    return
+                if late := await self._written(rpc, chunk, CHUNK_SECONDS_MAX):
+                    break
                 await self._count(peer, len(chunk.buffer))
+        if late is not None:
+            log.info("ended a file transfer: %s reads too slowly", host_of(peer))
+            await _give_up(rpc, late, "the file was not read in time")
 
     def _note_end(self, peer: str, code: int, asked: float | None) -> None:
         inputs = self._context.robot.inputs
         inputs.note_client(CALLED_OFF, "cyberdog", peer, operation=str(int(code)), asked=asked)
 
-    async def _written(self, rpc: grpc.aio.ServicerContext, chunk: object) -> bool:
-        """Write a chunk of a file; return False if the client has not taken it in time."""
-        writing = asyncio.ensure_future(self._write(rpc, chunk))
-        try:
-            await asyncio.wait([writing], timeout=CHUNK_SECONDS_MAX)
-        finally:
-            done = writing.done() or not writing.cancel()
-        if done:
-            await writing
-        return done
-
     async def _write(self, rpc: grpc.aio.ServicerContext, message: object) -> None:
-        """Write to a client; the time that this takes is not robot time.
+        """Write to a client, however long that takes."""
+        await self._written(rpc, message)
+
+    async def _written(
+        self, rpc: grpc.aio.ServicerContext, message: object, patience: float | None = None
+    ) -> asyncio.Future[None] | None:
+        """Write to a client; the time that this takes is not robot time. Return the write if it outlasts ``patience``.
 
         A call that ends meanwhile finishes the message: gRPC refuses a last one during another's write.
         """
         with self._context.robot.clock.holding():
-            writing = asyncio.ensure_future(rpc.write(message))
+            writing: asyncio.Future[None] = asyncio.ensure_future(rpc.write(message))
             try:
-                await asyncio.shield(writing)
+                await asyncio.wait([writing], timeout=patience)
             except asyncio.CancelledError:
-                writing.add_done_callback(lambda written: written.cancelled() or written.exception())  # it may be gone
+                _ignore_result(writing)
                 await asyncio.wait([writing], timeout=WRITE_MAX)
                 raise
+        if not writing.done():
+            return writing
+        await writing
+        return None
 
     async def _count(self, peer: str, size: int) -> None:
         """Count bytes to or from a client; delay one beyond its share."""
@@ -226,6 +227,21 @@ class Service:
     async def heartbeat(self, _request: None, rpc: grpc.aio.ServicerContext) -> None:
         """Refuse: only apps serve heartbeats."""
         await rpc.abort(grpc.StatusCode.UNIMPLEMENTED, "the robot sends heartbeats, it takes none")
+
+
+async def _give_up(rpc: grpc.aio.ServicerContext, late: asyncio.Future[None], why: str) -> None:
+    """End a call with an error, once the client has read the ``late`` message, which gRPC lets no status pass."""
+    try:
+        await asyncio.wait([late], timeout=RESUME_MAX)
+    finally:
+        _ignore_result(late)
+    rpc.set_code(grpc.StatusCode.DEADLINE_EXCEEDED)  # rpc.abort would wait for the client
+    rpc.set_details(why)
+
+
+def _ignore_result(writing: asyncio.Future[None]) -> None:
+    """Leave no error behind that nothing awaits: the client may be gone."""
+    writing.add_done_callback(lambda written: written.cancelled() or written.exception())
 
 
 def _note_unreadable(peer: str) -> None:

@@ -248,9 +248,12 @@ async def read_to_end(call: grpc.aio.UnaryStreamCall) -> None:
 async def test_files_nobody_reads_leave_room_for_others(
     client, robot, folder, pems, messages, door, monkeypatch, caplog, leaves
 ) -> None:
-    """gRPC takes up to some 16 MB for a client that reads nothing, and then no more."""
+    """gRPC takes up to some 16 MB for a client that reads nothing, and then no more.
+
+    A client that reads on later gets the status: one that was set during the last chunk's write often never came.
+    """
     monkeypatch.setattr(transfers, "HOST_TRANSFERS_MAX", 1)
-    monkeypatch.setattr(service, "CHUNK_SECONDS_MAX", 0.05)
+    monkeypatch.setattr(service, "CHUNK_SECONDS_MAX", 0.1)
     monkeypatch.setattr(service, "WRITE_MAX", 0.05)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "large.jpg").write_bytes(bytes(48_000_000))
@@ -261,7 +264,8 @@ async def test_files_nobody_reads_leave_room_for_others(
         answers = list[int]()
         async with asyncio.timeout(PATIENCE):
             while answers != [0]:
-                answers = [chunk.error_code for chunk in await other.file(4002, {"command": 1})]
+                with contextlib.suppress(grpc.aio.AioRpcError):  # too slow, on a busy machine
+                    answers = [chunk.error_code for chunk in await other.file(4002, {"command": 1})]
         if leaves:
             hung.cancel()
         else:  # the file is incomplete, and the status says so
