@@ -15,11 +15,25 @@ from roboglot.model.geometry import Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName, composite_of
+from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
 from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, encode_stcm
 from tests.protocols.slamware.drawings import ok
 
 SLAM, MULTI = "/api/core/slam/v1", "/api/multi-floor/map/v1"
+
+
+async def test_home_that_cannot_be_stored_is_none(robot: Robot, world: World, client: httpx.AsyncClient) -> None:
+    home = {"x": 5.0, "y": 1.0, "yaw": 0.5}
+    await ok(await client.delete(f"{SLAM}/homedocks"))
+    (fault,) = world.faults.inject("full_disk", "a")
+    assert (await client.put(f"{SLAM}/homepose", json=home)).status_code == 403
+    assert robot[Docking].home is None
+    world.faults.clear(fault.number)
+    await ok(await client.put(f"{SLAM}/homepose", json=home))
+    assert robot[Docking].home == Pose(5.0, 1.0, 0.5)
+    (own,) = (await client.get(f"{SLAM}/homedocks")).json()
+    assert own["metadata"] == {"display_name": "home"}
 
 
 async def test_docks(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:

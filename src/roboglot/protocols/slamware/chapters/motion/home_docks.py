@@ -23,8 +23,13 @@ def known_docks(robot: Robot) -> Docks:
     docking, entered = robot[Docking], robot[MapAnnotations].current.docks
     if entered or docking.home is None:
         return entered
+    return (own_dock(robot, docking.home),)
+
+
+def own_dock(robot: Robot, pose: Pose) -> PointOfInterest:
+    """Return the dock that a robot without any has at ``pose``."""
     id = uuid.uuid5(uuid.NAMESPACE_OID, f"{robot.description.serial} home dock")
-    return (PointOfInterest(str(id), docking.home, {NAME: "home"}),)
+    return PointOfInterest(str(id), pose, {NAME: "home"})
 
 
 def home_dock(robot: Robot) -> PointOfInterest | None:

@@ -16,7 +16,14 @@ from roboglot.model.errors import DockNotFound, InvalidGoal, NotFound
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
-from roboglot.protocols.slamware.chapters.motion.home_docks import NAME, Docks, change_docks, home_dock, known_docks
+from roboglot.protocols.slamware.chapters.motion.home_docks import (
+    NAME,
+    Docks,
+    change_docks,
+    home_dock,
+    known_docks,
+    own_dock,
+)
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import entry_of, pose3d, pose_of
@@ -45,12 +52,9 @@ def get_home_pose(context: Context) -> Pose3D:
 @TABLE.on(f"PUT {API}/homepose", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def set_home_pose(context: Context, body: Pose3D) -> bool:
     """Set the place of the home dock, by the robot's pose when docked."""
-    robot = context.robot
-    if home_dock(robot) is None:
-        robot[Docking].set_home(pose_of(body))
-    if (home := home_dock(robot)) is not None:
-        moved = replace(home, pose=pose_of(body))
-        await change_docks(robot, lambda docks: tuple(moved if dock.id == moved.id else dock for dock in docks))
+    robot, pose = context.robot, pose_of(body)
+    moved = replace(home_dock(robot) or own_dock(robot, pose), pose=pose)
+    await change_docks(robot, lambda docks: tuple(moved if dock.id == moved.id else dock for dock in docks or (moved,)))
     return True
 
 
