@@ -52,10 +52,13 @@ class Database:
         return database
 
     async def run(self, work: Callable[[Connection], T]) -> T:
-        """Run ``work`` in the database's thread as one transaction; an exception rolls it back."""
+        """Run ``work`` in the database's thread as one transaction; an exception rolls it back.
+
+        A caller that is cancelled meanwhile still gets the outcome, so that its copy in memory is that on disk.
+        """
         if self._in_place:
             return self.run_now(work)
-        return await asyncio.get_running_loop().run_in_executor(self._thread, self._transact, work)
+        return await _outcome(asyncio.get_running_loop().run_in_executor(self._thread, self._transact, work))
 
     async def read(self, work: Callable[[Connection], T]) -> T:
         """Run read-only ``work`` beside writing transactions, without waiting for a flush of the disk.
@@ -154,6 +157,23 @@ class Database:
             self._reader.close()
         self._thread.submit(self._connection.close).result()
         self._thread.shutdown()
+
+
+async def _outcome(writing: asyncio.Future[T]) -> T:
+    """Return the outcome of ``writing``; a task cancelled meanwhile goes on to its next wait."""
+    cancelled = False
+    try:
+        while True:
+            try:
+                return await asyncio.shield(writing)
+            except asyncio.CancelledError:
+                if writing.cancelled():
+                    raise
+                cancelled = True
+    finally:
+        if cancelled and (task := asyncio.current_task()) is not None:
+            task.uncancel()  # it counts once, for timeouts
+            task.cancel()
 
 
 def _without_cursor(result: T) -> T:
