@@ -28,11 +28,11 @@ PATIENCE = 60.0  # real s
 ADDRESS = free_addresses(1)
 
 
-def listening(port: int) -> None:
+def listening(port: int, address: str = ADDRESS) -> None:
     """Return when a broker answers there."""
     for _ in range(200):
         try:
-            socket.create_connection((ADDRESS, port), 0.1).close()
+            socket.create_connection((address, port), 0.1).close()
             return
         except OSError:
             time.sleep(0.05)

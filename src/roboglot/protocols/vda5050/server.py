@@ -32,6 +32,7 @@ RETRY = 2.0  # s between two attempts to connect
 LOOK_PERIOD = 0.2  # s of robot time between two checks for changes of the state
 STATE_PERIOD = 30.0  # s after which the state is sent even if unchanged
 LINK_SECONDS = 5.0  # for an answer from the broker
+TIMED_OUT = "Operation timed out"  # in aiomqtt's error
 KEEPALIVE = 15  # s after which the broker reports that the robot is gone
 CLOSING = 1.0  # s to disconnect from the broker
 
@@ -56,6 +57,7 @@ class Vda5050Door:
         self._headers: dict[str, int] = {}
         self._task: asyncio.Task[None] | None = None
         self._client: Any = None
+        self._library = LastError()
         self._turns = Turns(robot, f"{self.name} {robot.id}:broker")
         self._log_limiter = LogLimiter(log)
         self._sent: object = None  # the last state sent, rounded, and when (robot time)
@@ -68,9 +70,11 @@ class Vda5050Door:
         """The topics at the broker."""
         if not self._config.broker:
             return ()
-        host, port = self._config.address
-        listen = f"mosquitto_sub -h {host} -p {port} -v -t '{self._topic('#')}'"
-        return [Endpoint("VDA 5050", f"mqtt://{host}:{port}/{self._topic('')}", listen)]
+        config, (host, port) = self._config, self._config.address
+        certificates = f" --cafile {config.ca}" if config.ca else " --capath /etc/ssl/certs"
+        options = certificates * config.tls + f" -u {config.username} -P PASSWORD" * bool(config.username)
+        listen = f"mosquitto_sub -h {host} -p {port}{options} -v -t '{self._topic('#')}'"
+        return [Endpoint("VDA 5050", f"mqtt{'s' * config.tls}://{host}:{port}/{self._topic('')}", listen)]
 
     def _topic(self, name: str) -> str:
         config = self._config
@@ -104,8 +108,9 @@ class Vda5050Door:
             try:
                 await self._serve(host, port)
             except (aiomqtt.MqttError, OSError) as error:
+                why = self._unanswered() if str(error) == TIMED_OUT and self._client is None else error
                 self._log_limiter.warning(
-                    "dial", "robot %s: no fleet control at %s:%d: %s", self._robot.id, host, port, error
+                    "dial", "robot %s: no fleet control at %s:%d: %s", self._robot.id, host, port, why
                 )
             except SwitchedOff:
                 log.info("robot %s leaves fleet control: it is switched off", self._robot.id)
@@ -115,11 +120,17 @@ class Vda5050Door:
                 await asyncio.sleep(LOOK_PERIOD)  # noqa: TID251 - the broker's time, not the robot's
             await asyncio.sleep(RETRY)  # noqa: TID251 - the broker's time, not the robot's
 
+    def _unanswered(self) -> str:
+        """Return why no broker has answered, in more words than the library's exception has."""
+        why = f": {self._library.last}" if self._library.last else ""
+        hint = "" if self._config.tls else "; if it is a broker that encrypts, set tls = true"
+        return f"it does not answer as a broker{why}{hint}"
+
     async def _serve(self, host: str, port: int) -> None:
         """Receive and send over one connection until it breaks."""
         import aiomqtt
 
-        config = self._config
+        config, self._library = self._config, LastError()
         broken = "CONNECTION_BROKEN" if self._version.new_words else "CONNECTIONBROKEN"
         will = aiomqtt.Will(
             self._topic("connection"), self._message("connection", {"connectionState": broken}), 1, True
@@ -134,6 +145,7 @@ class Vda5050Door:
             timeout=LINK_SECONDS,
             tls_context=_tls(config),
             queue_type=Intake,
+            logger=self._library.logger,
         ) as client:
             self._client = client
             await self._introduce(f"{host}:{port}")
@@ -294,6 +306,20 @@ async def _until_one_ends(*jobs: Awaitable[None]) -> None:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+
+
+class LastError(logging.Handler):
+    """Keeps the last error that the library has logged: it logs one at each try, often without a word of whose."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.ERROR)
+        self.last = ""
+        self.logger = logging.Logger("mqtt")
+        self.logger.addHandler(self)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep the line."""
+        self.last = record.getMessage()
 
 
 def _tls(config: Vda5050Config) -> ssl.SSLContext | None:
