@@ -93,6 +93,43 @@ async def test_a_hung_world_holds_up_no_other(fleet_host, monkeypatch: pytest.Mo
     assert await page._snapshots.state("a1") == {"battery": {"charge": 0.5}}
 
 
+async def test_silent_worlds_are_not_asked(fleet_host) -> None:
+    """Each request would hold one of the program's few threads until it is given up."""
+    glances = Snapshots(fleet_host, Console)
+    fleet_host.shards["w1"].silent = 4.0
+    assert await glances.state("a1") == {"error": "not answering for 4 s"}
+    with pytest.raises(Refused, match="not answering for 4 s"):
+        await glances.picture("a1")
+    assert Console.asked == []
+
+
+async def test_hung_consoles_are_given_up_early(fleet_host) -> None:
+    limits: list[float] = []
+
+    def hang(_: Request, timeout: float) -> None:
+        limits.append(timeout)
+        raise TimeoutError("timed out")
+
+    with patch("roboglot.agents.console.urlopen", hang):
+        assert "timed out" in str(await Snapshots(fleet_host).state("a1"))
+    assert limits == [snapshots.ANSWER_MAX]
+
+
+async def test_other_programs_at_an_address_are_named(fleet_host) -> None:
+    """Another one may listen there by now, or the world's has written nonsense as it died."""
+
+    def serve(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(b"\x1b[2Jnonsense\r\n\r\n")
+        writer.close()
+
+    other = await asyncio.start_server(serve, "127.0.0.1", 0)
+    url = "http://127.0.0.1:{1}".format(*other.sockets[0].getsockname())
+    fleet_host.shards["w1"].ready = Ready({}, url)
+    found = await Snapshots(fleet_host).state("a1")
+    assert found == {"error": f"no roboglot answers at {url}: it is no HTTP (BadStatusLine)"}
+    other.close()
+
+
 async def test_worlds_that_ask_for_a_log_in(fleet_host) -> None:
     """Each console has its own; a browser that signs in there is not known to the fleet's page."""
 

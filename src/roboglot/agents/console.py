@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import http.client
 from collections.abc import Mapping
 from typing import TypeVar
 from urllib.error import HTTPError, URLError
@@ -27,10 +28,13 @@ class Refused(Exception):
 
 
 class ConsoleClient:
-    """One console at ``url`` (http://127.0.0.1:50080); ``token``: if access is controlled."""
+    """One console at ``url`` (http://127.0.0.1:50080); ``token``: if access is controlled.
 
-    def __init__(self, url: str, token: str = "") -> None:
-        self._url = url.rstrip("/")
+    ``seconds``: for which the console may be silent.
+    """
+
+    def __init__(self, url: str, token: str = "", seconds: float = SECONDS) -> None:
+        self._url, self._seconds = url.rstrip("/"), seconds
         self._headers = {"authorization": f"Bearer {token}"} if token else {}
 
     async def get(self, kind: type[T], *path: str) -> T:
@@ -49,13 +53,15 @@ class ConsoleClient:
 
     def _fetch(self, request: Request) -> bytes:
         try:
-            with urlopen(request, timeout=SECONDS) as reply:
+            with urlopen(request, timeout=self._seconds) as reply:
                 data: bytes = reply.read(ANSWER_MAX + 1)
         except HTTPError as error:
             with error:
                 refused = Refused(_reason(error))
                 refused.status = error.code
                 raise refused from None
+        except http.client.HTTPException as error:
+            raise Refused(f"no roboglot answers at {self._url}: it is no HTTP ({type(error).__name__})") from None
         except (URLError, OSError) as error:
             why = getattr(error, "reason", error)
             raise Refused(f"no roboglot answers at {self._url}: {why}; start it with `roboglot up`") from None

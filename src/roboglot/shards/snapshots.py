@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine
+from functools import partial
 from typing import Generic, TypeVar
 
 from roboglot.agents.console import ConsoleClient, Refused
@@ -36,8 +37,9 @@ class _Newest(Generic[T]):
 class Snapshots:
     """Polls the robots of one fleet, once for all pages."""
 
-    def __init__(self, fleet_host: FleetHost, client: Callable[[str], ConsoleClient] = ConsoleClient) -> None:
-        self._fleet_host, self._client = fleet_host, client
+    def __init__(self, fleet_host: FleetHost, client: Callable[[str], ConsoleClient] | None = None) -> None:
+        self._fleet_host = fleet_host
+        self._client = client or partial(ConsoleClient, seconds=ANSWER_MAX)  # each takes a thread meanwhile
         self._states: _Newest[dict[str, object]] = _Newest()
         self._pictures: _Newest[bytes] = _Newest()
         self._turns = asyncio.Semaphore(AT_ONCE_MAX)
@@ -47,7 +49,10 @@ class Snapshots:
 
         Raises LookupError.
         """
-        console = self._console(self._home(robot))
+        shard = self._home(robot)
+        console = self._console(shard)
+        if shard.silent:
+            return {"error": shard.trouble}
 
         async def look() -> dict[str, object]:
             if console is None:
@@ -68,7 +73,10 @@ class Snapshots:
 
     async def picture(self, robot: str) -> bytes:
         """Return the small picture of a robot's map, a PNG. Raises LookupError, Refused."""
-        console = self._console(self._home(robot))
+        shard = self._home(robot)
+        console = self._console(shard)
+        if shard.silent:
+            raise Refused(shard.trouble)
         if console is None:
             raise Refused("this world has no console")
 
