@@ -97,7 +97,7 @@ async def test_reload_after_the_end_shows_output_and_error(studio: Open) -> None
     await page.reload()
     await until(page, f"window.studio && ({failed}).includes('divided by zero')")
     await prints(page, "hi")
-    await shows(page, WORD, "Ended with an error")
+    await shows(page, WORD, "Failed")
     await page.evaluate("import('/studio/program.js').then(p => p.fresh())")
     await shows(page, WORD, "Ready")
     await prints(page)
@@ -134,3 +134,45 @@ async def test_silent_server_counts_as_lost(studio: Open, monkeypatch: pytest.Mo
     await page.wait_for_selector(".banner.bad")
     await shows(page, ONLINE, "open")
     await page.wait_for_selector(".banner.bad", state="detached")
+
+
+ENDINGS = {
+    "Failed": "studio.runner.failure.value = { text: 'why', line: 0, block: '' }",
+    "Not all done": "studio.runner.failure.value = null; studio.runner.refused.value = [{ block: '', words: 'no' }]",
+}
+CUT = "['.phase', '[role=tablist]'].filter(name => { const e = document.querySelector(name); " \
+    "return e.clientWidth && e.scrollWidth > e.clientWidth; })"  # fmt: skip
+ON_TOP = """(() => {
+    const said = document.querySelector('.notice'), { left, right, top, bottom } = said.getBoundingClientRect();
+    said.style.pointerEvents = 'auto';
+    const y = (top + bottom) / 2, seen = [left + 2, (left + right) / 2, right - 2].every(
+        (x) => said.contains(document.elementFromPoint(x, y)));
+    const below = document.querySelector('.switch').getBoundingClientRect();
+    return seen && (!below.height || bottom <= below.top);
+})()"""
+
+
+async def test_endings_and_tabs_fit_every_width(studio: Open) -> None:
+    page = await studio()
+    for ending, made in ENDINGS.items():
+        await page.evaluate(made)
+        await shows(page, WORD, ending)
+        for width in (390, 768, 820, 900, 1024, 1280, 1920):
+            await page.set_viewport_size({"width": width, "height": 800})
+            assert await page.evaluate(CUT) == [], (ending, width)
+            assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth"), width
+
+
+async def test_notices_cover_toolbox_and_leave_buttons(studio: Open) -> None:
+    page = await studio()
+    for width in (390, 820, 1280):
+        await page.set_viewport_size({"width": width, "height": 800})
+        await page.evaluate("studio.say('The dictionary has no such entry, nor any other of that name.', true)")
+        await shows(page, ON_TOP, True)
+
+
+async def test_hint_makes_way_for_the_toolbox(studio: Open) -> None:
+    page = await studio()
+    assert await page.locator(".start p").is_visible()
+    await page.click("#math")
+    await page.wait_for_selector(".start p", state="hidden")

@@ -49,7 +49,7 @@ async def test_run_ends_with_what_was_refused(studio: Open) -> None:
     page = await loaded(await studio(), TOO_FAST)
     await page.click("#tab-output")
     await page.keyboard.press("F5")
-    await shows(page, WORD, "Ended: the robot could not do everything")
+    await shows(page, WORD, "Not all done")
     await prints(page, "on")
     shown = "document.querySelector('.panel .failure')?.textContent ?? ''"
     await shows(page, shown, f"The robot could not do this:motion.go_straight (line 1): {WHY}")
@@ -60,7 +60,7 @@ async def test_run_ends_with_what_was_refused(studio: Open) -> None:
     await shows(page, "document.querySelector('.value-bubble[data-of=fast] text')?.textContent", zh)
     await page.reload()  # the page is another, the run is the same
     await until(page, READY)
-    await shows(page, WORD, "已结束：机器人没能全部做到")
+    await shows(page, WORD, "没能全部做到")
     await page.wait_for_selector(f".panel .failure[role=status] >> text={zh}")
     await until(page, "document.querySelector('.wrong')?.dataset.id === 'fast'")
     assert page.errors == []
@@ -158,7 +158,7 @@ async def test_error_leaves_what_was_refused_before_it(studio: Open) -> None:
     page = await loaded(await studio(), both)
     await page.click("#tab-output")
     await page.keyboard.press("F5")
-    await shows(page, WORD, "Ended with an error")
+    await shows(page, WORD, "Failed")
     refused = f"The robot could not do this:motion.go_straight (line 1): {WHY}"
     await shows(page, "document.querySelector('.panel .failure[role=status]')?.textContent ?? ''", refused)
     await page.wait_for_selector(".panel .failure[role=group] >> text=/ZeroDivisionError: .* .line 2: /")
