@@ -36,7 +36,7 @@ PROFILES = ("run", "dev")  # dev includes all of run
 INDEX = "https://pypi.org/simple"
 PAGE_BYTES_MAX = 32 * 1024 * 1024
 UNWANTED = {"PIP_TARGET", "PIP_PREFIX", "PIP_ROOT", "PIP_QUIET", "PIP_NO_BINARY", "PYTHONHOME", "PYTHONPATH"}
-FULL = "The disk is full: about 700 MB are needed."
+FULL = "The disk is full: about 750 MB are needed."
 CLOSED = "Clone roboglot into a folder of your own, or have the owner of this one run scripts/run once."
 HINTS = {
     "CERTIFICATE_VERIFY_FAILED": "Certificates aren't trusted: install ca-certificates, or name your own in PIP_CERT.",

@@ -197,12 +197,12 @@ def test_without_a_network_the_way_out_is_named(mirror: Path, tmp_path: Path) ->
 
 def test_the_likely_reason_is_named() -> None:
     assert "PIP_CERT" in bootstrap.hint("… CERTIFICATE_VERIFY_FAILED …")
-    assert "700 MB" in bootstrap.hint("OSError: No space left on device")
+    assert "750 MB" in bootstrap.hint("OSError: No space left on device")
 
 
 @pytest.mark.parametrize(
     ("number", "says"),
-    [(errno.EACCES, "Clone roboglot into"), (errno.EROFS, "Clone roboglot into"), (errno.EDQUOT, "700 MB")],
+    [(errno.EACCES, "Clone roboglot into"), (errno.EROFS, "Clone roboglot into"), (errno.EDQUOT, "750 MB")],
 )
 def test_unwritable_folder_is_named_with_the_way_out(number: int, says: str) -> None:
     words = bootstrap.in_words(OSError(number, os.strerror(number), "/srv/roboglot/.venv"))
