@@ -117,6 +117,14 @@ async def test_escape_stops_and_letting_go_does(served: Served, open_console: Op
     await page.keyboard.up("w")
 
 
+async def test_arrow_keys_drive_after_the_tab(served: Served, open_console: OpenConsole) -> None:
+    page = await open_console()
+    await page.click("#tab-drive")
+    await page.keyboard.down("ArrowUp")
+    await until(lambda: is_driven(served.robot))
+    await page.keyboard.up("ArrowUp")
+
+
 @pytest.mark.slow  # in short: test_the_robot_stands_when_the_pad_falls_silent
 async def test_a_gamepad_drives_and_stops(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
@@ -189,6 +197,7 @@ async def test_labels_of_new_plots_differ(served: Served, open_console: OpenCons
     await page.evaluate(WRITTEN)
     await page.click("#tab-plots")
     await page.locator("[data-plot=speed] canvas").wait_for()
+    await page.wait_for_selector(r"[data-plot=amperes] b >> text=/^-?\d+\.\d A$/")  # as under State
     for _ in range(3):  # with one value, two, three
         await until_page(page, "window.written.some((texts) => texts.includes('0 s'))")
         for texts in await page.evaluate("window.written"):

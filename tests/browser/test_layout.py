@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from roboglot.model.components.motion.docking import Docking
 from roboglot.shards.overview import Overview
 from roboglot.shards.snapshots import Snapshots
 from tests.browser.served import PAGE_PATIENCE, PATIENCE, STILL, OpenConsole, Served, becomes
@@ -21,6 +22,8 @@ VIEWS = {
     "live": ("state", "drive", "actions", "plots"),
     "world": ("people", "faults", "drawn", "clock"),
     "robots": (),
+    "recordings": (),
+    "wire": (),
     "class": (),
 }
 SMALL_TARGETS = """() => [...document.querySelectorAll('button, a, select, input')]
@@ -123,6 +126,13 @@ async def test_times_and_faults_are_said_once(served: Served, open_console: Open
     await page.evaluate(LOW)
     await page.wait_for_selector("text=/ 23 min left$/")
     assert await page.inner_text(".faults li") == "battery low"
+
+
+async def test_text_counts_the_dock_that_is_drawn(served: Served, open_console: OpenConsole) -> None:
+    page = await open_console()
+    assert served.robot[Docking].home is not None
+    await page.click("text=What the map shows, as text")
+    await page.wait_for_selector("text=Drawn on the map: lines 0, areas 0, docks 1.")
 
 
 async def test_only_panels_scroll(served: Served, open_console: OpenConsole) -> None:

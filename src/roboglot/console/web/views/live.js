@@ -94,7 +94,7 @@ function State() {
       <p>${pose && t("list.robot", { name: current.value, x: fixed(pose[0], 1), y: fixed(pose[1], 1), yaw: Math.round(pose[2] * 180 / Math.PI) })}</p>
       <ul class="list">${drawings.places.map((p) => html`<li><span>${p.name}</span><small>${fixed(p.pose[0], 1)}, ${fixed(p.pose[1], 1)}</small>
         <${Button} label=${t("go")} of=${p.name} verb="go_to" onClick=${() => go([[p.pose[0], p.pose[1]]], p.pose[2])} /></li>`)}</ul>
-      <p>${t("list.drawn", { lines: drawings.lines.length, areas: drawings.areas.length, docks: drawings.docks.length })}</p>
+      <p>${t("list.drawn", { lines: drawings.lines.length, areas: drawings.areas.length, docks: new Set([...drawings.docks.map((d) => d.pose), place.home].filter(Boolean).map(String)).size })}</p>
       ${can("go_to") && html`<form class="inline" onSubmit=${(e) => { e.preventDefault(); const f = new FormData(e.target); go([[Number(f.get("x")), Number(f.get("y"))]]); }}>
         <label>x <input name="x" type="number" step="0.1" required /></label><label>y <input name="y" type="number" step="0.1" required /></label>
         <${Button} type="submit" label=${t("go")} verb="go_to" /></form>`}
@@ -127,6 +127,7 @@ const note = () => { setTimeout(() => plots().catch(note), 2000); }; // from the
 note();
 const TABS = { state: State, drive: Drive, actions: Actions, plots: later(plots) };
 
+/** After a mouse, arrow keys are the panel's: they drive there. */
 export function Tabs({ tabs, chosen, label }) {
   const move = (event) => {
     const names = Object.keys(tabs), step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
@@ -136,7 +137,7 @@ export function Tabs({ tabs, chosen, label }) {
   };
   return html`<div class="tabs" role="tablist" aria-label=${label} onKeyDown=${move}>${Object.keys(tabs).map((name) => html`
     <button type="button" role="tab" id=${`tab-${name}`} aria-selected=${String(chosen.value === name)} aria-controls="panel" tabindex=${chosen.value === name ? 0 : -1}
-      onClick=${() => { chosen.value = name; }}>${t(`tab.${name}`)}</button>`)}</div>`;
+      onClick=${(e) => { chosen.value = name; if (e.detail) document.getElementById("panel")?.focus({ preventScroll: true }); }}>${t(`tab.${name}`)}</button>`)}</div>`;
 }
 
 export function Live() {

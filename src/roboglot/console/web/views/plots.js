@@ -88,7 +88,7 @@ function Plot({ name, unit, range }) {
     return () => { gone = true; stop(); watcher.disconnect(); plot?.destroy(); };
   }, [theme.value, language.value]);
   void drawn.value;
-  const newest = columns(name)[1].at(-1), said = newest === null || newest === undefined ? "–" : `${fixed(newest, name === "speed" ? 2 : 0)} ${unit}`;
+  const newest = columns(name)[1].at(-1), said = newest === null || newest === undefined ? "–" : `${fixed(newest, { speed: 2, amperes: 1 }[name] ?? 0)} ${unit}`;
   return html`<div class="card plot" data-plot=${name}><h3>${t(`plot.${name}`)}<b>${said}</b></h3><div ref=${place} role="img" aria-label=${`${t(`plot.${name}`)}: ${said}`}></div></div>`;
 }
 
