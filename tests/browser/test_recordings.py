@@ -21,13 +21,15 @@ async def test_a_recording_is_begun_marked_and_ended(served: Served, open_consol
     await page.wait_for_selector("header >> text=REC")
     async with page.expect_response("**/api/recording"):
         await page.click("button:has-text('Mark')")
+    await page.click("main a:has-text('Recordings')")
+    await page.wait_for_selector("main li >> text=being recorded")
+    assert "MB" not in await page.inner_text("main li")  # the card above says what is written
     await served.clock.advance(1.0)
     await page.click("text=End the recording")
     await page.wait_for_selector("text=is under")
     (file,) = (served.runtime.config.data / "recordings").glob("*.mcap")
     assert read_recording(file).topics["/marks"] == 1
 
-    await page.click("main a:has-text('Recordings')")
     row = page.locator(f"li:has-text('{file.name}')")
     await row.locator("text=1.0 s · ").wait_for()
     async with page.expect_download() as loading:

@@ -56,7 +56,7 @@ function Row({ one }) {
   const when = new Date(one.at * 1000).toLocaleString(language.value === "zh" ? "zh-CN" : "en-GB", { dateStyle: "medium", timeStyle: "short" });
   const length = one.running ? t("recordings.running") : one.seconds === null ? t("recordings.cut") : duration(one.seconds);
   return html`<li class="card"><h2>${one.file}</h2>
-    <p class=${(one.seconds === null && !one.running) || one.damage ? "warned" : "muted"}>${[when, one.damage ? t("recordings.damaged", { why: one.damage }) : length, `${megabytes} MB`, one.robots.length && `${t("robot")} ${one.robots.join(", ")}`, one.world].filter(Boolean).join(" · ")}</p>
+    <p class=${(one.seconds === null && !one.running) || one.damage ? "warned" : "muted"}>${[when, one.damage ? t("recordings.damaged", { why: one.damage }) : length, !one.running && `${megabytes} MB`, one.robots.length && `${t("robot")} ${one.robots.join(", ")}`, one.world].filter(Boolean).join(" · ")}</p>
     ${!one.running && html`<div class="buttons">${!one.damage && html`<${Button} icon="play" label=${t("recordings.play")} of=${one.file} on=${shown.value === one.file} onClick=${() => { shown.value = shown.value === one.file ? "" : one.file; }} />`}
       ${!one.damage && all.value && all.value.filter((r) => !r.running && !r.damage).length > 1 && html`<${Compared} one=${one} />`}
       ${one.parts.map((part, i) => html`<a class="button" href=${`/api/recordings/${encodeURIComponent(part.file)}`} download=${part.file} aria-label=${`${t("recordings.download")}: ${part.file}`}>${t("recordings.download")}${several ? ` ${i + 1}` : ""}</a>`)}
