@@ -137,6 +137,16 @@ async def offered(page: Page, what: str) -> bool:
     return not off
 
 
+async def test_account_names_itself_and_misses_the_class(guarded: Guarded, open_page: Open) -> None:
+    guarded.add("drew", "drive", "a")
+    page = await open_page()
+    await sign_in(page, "drew")
+    await page.wait_for_selector("text=Take control")
+    assert await page.locator("text=Your name").count() == 0  # control is taken under the account's
+    await page.evaluate("location.hash = '#/class'")
+    await page.wait_for_selector("main >> text=/Refused: opening and leading a class needs/")
+
+
 async def test_buttons_follow_rights_that_change(guarded: Guarded, open_page: Open) -> None:
     """The other roles in one page, which comes back by itself when a right is lost."""
     guarded.add("several", "admin")

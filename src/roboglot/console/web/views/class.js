@@ -1,15 +1,15 @@
 // The class: pupils join by a code and get a robot each; the teacher sees who is where, locks, resets, gives back.
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
-import { Button, fetched, html, robotWord, say, t } from "../base.js";
+import { Button, fetched, html, robotWord, say, t, translated } from "../base.js";
 import { choose, states } from "../link.js";
 
 const LOOK = 1000; // ms between two looks at who is there
-const group = signal(/** @type {any} */ (null));
+const group = signal(/** @type {any} */ (null)), failure = signal("");
 
 /** @param {object} [wish] */
 async function ask(wish) {
-  try { group.value = await fetched("/api/class", wish); } catch (error) { if (wish) say(t("refused", { why: error.message }), true); }
+  try { group.value = await fetched("/api/class", wish); failure.value = ""; } catch (error) { if (wish) say(t("refused", { why: error.message }), true); else failure.value = error.message; }
 }
 
 function Open() {
@@ -32,7 +32,7 @@ function Pupil({ pupil }) {
 
 export function Class() {
   useEffect(() => { ask(); const timer = setInterval(() => { if (!document.hidden) ask(); }, LOOK); return () => clearInterval(timer); }, []);
-  if (!group.value) return null;
+  if (!group.value) return failure.value && html`<p class="empty">${t("refused", { why: translated(failure.value) })}</p>`;
   if (!group.value.code) return html`<section class="robots" aria-label=${t("view.class")}><${Open} /></section>`;
   const { code, name, pupils, minutes } = group.value, locked = pupils.length > 0 && pupils.every((p) => p.locked);
   return html`<section class="robots" aria-label=${t("view.class")}><div class="bar"><div><h1>${t("class.named", { name })} <output class="code">${code}</output></h1>

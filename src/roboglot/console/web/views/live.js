@@ -2,7 +2,7 @@
 import { signal } from "@preact/signals";
 import { Button, Icon, can, duration, fixed, html, person, robotWord, say, t } from "../base.js";
 import { MapView } from "../map.js";
-import { command, current, introduce, poses, simulated, stale, state, wanted, you } from "../link.js";
+import { command, current, introduce, me, poses, simulated, stale, state, wanted, you } from "../link.js";
 import { Drive } from "./drive.js";
 import { later } from "./later.js";
 import { Recording } from "./recording.js";
@@ -63,8 +63,8 @@ function Control() {
   const who = control.taken_by || control.holder;
   const word = control.taken_by ? (mine ? t("control.mine") : t("control.taken", { who })) : who ? t("control.moves", { who, doing: robotWord(control.doing) }) : t("control.free");
   return html`<div class="card"><h3>${t("control")}</h3><p class=${control.taken_by && !mine ? "warned" : ""}>${word}</p>
-    <label class="field"><span>${t("control.name")}</span><input value=${person.value} maxlength="40" autocomplete="nickname"
-      onChange=${(e) => { person.value = e.target.value.trim() || person.value; introduce(); }} /></label>
+    ${!me.value.name && html`<label class="field"><span>${t("control.name")}</span><input value=${person.value} maxlength="40" autocomplete="nickname"
+      onChange=${(e) => { person.value = e.target.value.trim() || person.value; introduce(); }} /></label>`}
     <div class="buttons">
       ${!mine && html`<${Button} label=${t("control.take")} verb="take_control" onClick=${() => command("take_control")} />`}
       ${control.taken_by && html`<${Button} label=${t("control.release")} verb="release_control" onClick=${() => command("release_control")} />`}
