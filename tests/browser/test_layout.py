@@ -202,6 +202,7 @@ async def test_fleet_page_filters_its_robots(browser: Any, tmp_path: Path) -> No
     assert await page.locator("header .brand").is_visible()
     await page.locator("input[type=search]").fill("a2")
     await page.wait_for_selector(".tile:has(.thumbnail) >> text=All is well.")
+    assert str(await page.locator(".tile a").get_attribute("href")).endswith("/?robot=a2#/live")
     await fleet.close()  # the page says so where it is seen, and calls no robot well
     await page.wait_for_selector(".tile >> text=Last known:")
     assert await page.locator(".allwell, .thumbnail").count() == 0

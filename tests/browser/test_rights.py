@@ -138,10 +138,11 @@ async def offered(page: Page, what: str) -> bool:
 
 
 async def test_account_names_itself_and_misses_the_class(guarded: Guarded, open_page: Open) -> None:
-    guarded.add("drew", "drive", "a")
-    page = await open_page()
+    guarded.add("drew", "drive")
+    page = await open_page("/?robot=b")  # as the fleet's page names it
     await sign_in(page, "drew")
     await page.wait_for_selector("text=Take control")
+    assert await page.locator("header select").input_value() == "b"
     assert await page.locator("text=Your name").count() == 0  # control is taken under the account's
     await page.evaluate("location.hash = '#/class'")
     await page.wait_for_selector("main >> text=/Refused: opening and leading a class needs/")

@@ -1,6 +1,6 @@
 // The socket to the runtime: the state of every robot, commands, its own age.
 import { signal, computed, batch, effect } from "@preact/signals";
-import { lacks, notice, person, rights, say, t, kept } from "./base.js";
+import { lacks, notice, person, rights, say, sent, t, kept } from "./base.js";
 import { pulse } from "./pulse.js";
 
 export const status = signal(/** @type {"opening" | "open" | "lost" | "out"} */ ("opening")); // out: a name is needed
@@ -24,6 +24,10 @@ export const recording = signal(false);
 export const padRefused = signal("");
 
 export const chosen = kept("robot", "");
+if (sent.has("robot")) { // by the fleet's page; after a reload the choice counts that was made since
+  chosen.value = String(sent.get("robot"));
+  history.replaceState(null, "", location.pathname + location.hash);
+}
 export const current = computed(() => {
   const robots = hello.value?.robots ?? [];
   return robots.some((r) => r.name === chosen.value) ? chosen.value : robots[0]?.name ?? "";

@@ -64,7 +64,7 @@ function Tile({ robot, world }) {
     ${!up && world.reason ? html`<p class="warned"><${Icon} name="alert" size=${16} />${t("fleet.why", { why: world.reason })}</p>` : null}
     ${state?.error ? html`<p class="muted">${t("fleet.why", { why: state.error })}</p>` : null}
     ${known && (state.safety.emergency_stop ? html`<p class="warned"><${Icon} name="alert" size=${16} />${t("estop.on")}</p>` : state.faults.length ? html`<p class="warned"><${Icon} name="alert" size=${16} />${robotWord(state.faults[0].name)}</p>` : !lost.value && html`<p class="allwell">${t("faults.none")}</p>`)}
-    ${up && world.console && html`<div class="buttons"><a class="button main" href=${`${world.console}/#/live`} target="_blank" rel="noopener"><span>${t("show")}</span></a></div>`}</li>`;
+    ${up && world.console && html`<div class="buttons"><a class="button main" href=${`${world.console}/?robot=${encodeURIComponent(robot.name)}#/live`} target="_blank" rel="noopener"><span>${t("show")}</span></a></div>`}</li>`;
 }
 
 /** Whether a robot fits the filter: by its name, body or address, or its world's name or state. @param {{robot: any, world: any}} row */
