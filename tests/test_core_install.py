@@ -29,7 +29,7 @@ from roboglot.testing.process import served
 
 ROOT = Path(__file__).resolve().parent.parent
 # Of roboglot and all that its core requires; compiled packages are a little larger for later Pythons.
-CORE_BYTES_MAX = 15 * 2**20 + (0 if sys.version_info < (3, 12) else 100_000)
+CORE_BYTES_MAX = 14 * 2**20 + (0 if sys.version_info < (3, 12) else 100_000)
 HEAVY = set(EXTRA_OF)
 
 

@@ -26,6 +26,7 @@ EXTRA_OF = {
     "google": "cyberdog",  # protobuf
     "grpc": "cyberdog",
     "hpack": "recording",
+    "httptools": "slamware",
     "httpx": "demo",
     "llvmlite": "simulation",
     "mcap": "recording",
@@ -52,12 +53,12 @@ EXTRA_OF = {
 # The modules in each extra that is made of no others.
 MODULES: dict[str, tuple[str, ...]] = {
     "simulation": ("mujoco", "numba", "llvmlite", "numpy", "PIL", "yaml"),
-    "slamware": ("numpy", "uvicorn", "uvloop"),
+    "slamware": ("httptools", "numpy", "uvicorn", "uvloop"),
     "cyberdog": ("cryptography", "grpc", "google", "numpy"),
     "video": ("aiortc", "av", "numpy", "PIL"),
     "programs": ("numpy", "websockets"),
-    "console": ("numpy", "prometheus_client", "uvicorn", "uvloop", "wsproto"),
-    "recording": ("foxglove_schemas_protobuf", "google", "hpack", "mcap", "numpy", "zstandard"),
+    "console": ("httptools", "numpy", "prometheus_client", "uvicorn", "uvloop", "wsproto"),
+    "recording": ("foxglove_schemas_protobuf", "google", "hpack", "httptools", "mcap", "numpy", "zstandard"),
     "logs": ("rosbags",),
     "postgresql": ("psycopg",),
     "testing": ("pytest_asyncio",),

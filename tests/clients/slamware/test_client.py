@@ -157,6 +157,37 @@ async def test_bad_answers_are_reported_and_nothing_hangs(
         await client.get_pose()
 
 
+POSE = b'{"x": 1.0, "y": 2.0, "z": 0.0, "yaw": 0.5, "pitch": 0.0, "roll": 0.0}'
+CHUNKED = b"HTTP/1.1 200 OK\r\ntransfer-encoding: chunked\r\n\r\n%x\r\n%s\r\n0\r\n\r\n"
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"HTTP/1.0 200 OK\r\n\r\n" + POSE,  # its end is that of the connection
+        b"HTTP/1.1 200\r\nconnection: close\r\n\r\n" + POSE,
+        CHUNKED % (len(POSE), POSE),
+        b"HTTP/1.1 102 Processing\r\n\r\n" + JSON % (len(POSE), POSE),
+    ],
+)
+async def test_answers_of_every_length_are_read(
+    fake: Callable[[Reply], Awaitable[SlamwareClient]], data: bytes
+) -> None:
+    client = await fake(answering(data))
+    for _ in range(2):
+        assert (await client.get_pose()).x == 1.0
+
+
+async def test_more_than_was_asked_for_ends_the_connection(
+    fake: Callable[[Reply], Awaitable[SlamwareClient]],
+) -> None:
+    """It is no answer to the next request."""
+    other = POSE.replace(b"1.0", b"7.0")
+    client = await fake(answering(JSON % (len(POSE), POSE) + JSON % (len(other), other)))
+    for _ in range(2):
+        assert (await client.get_pose()).x == 1.0
+
+
 async def test_unlisted_flags_of_a_robot_are_read(fake: Callable[[Reply], Awaitable[SlamwareClient]]) -> None:
     data = b'{"mode": 0, "flags": ["with_yaw", "fast", null], "yaw": 1.5}'
     client = await fake(answering(JSON % (len(data), data)))

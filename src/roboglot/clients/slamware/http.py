@@ -1,7 +1,7 @@
 """HTTP/1.1 to one robot over a few kept connections. Knows no API.
 
-No library, because a driver makes thirty requests a second: a request takes half a millisecond here, and only GET
-requests, which change nothing, are ever sent twice.
+No client library, because a driver makes thirty requests a second: a request takes half a millisecond here, and only
+GET requests, which change nothing, are ever sent twice. h11 reads the answers: it is small, and needs no compiler.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import asyncio
 from dataclasses import field
 from typing import cast
 
-import httptools
+import h11
 
 from roboglot.clients.errors import BadAnswer, LinkLost, TimedOut
 from roboglot.model.clock import Clock
@@ -39,30 +39,35 @@ class _Connection(asyncio.Protocol):
     def __init__(self) -> None:
         self.transport: asyncio.Transport | None = None
         self.open = False
-        self._parser: httptools.HttpResponseParser | None = None
+        self._answering: h11.Connection | None = None
         self._answer = Answer()
         self._waiting: asyncio.Future[Answer] | None = None
-        self._head_bytes = 0
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self.transport, self.open = cast(asyncio.Transport, transport), True  # uvloop's does not inherit from it
 
     def connection_lost(self, exc: Exception | None) -> None:
+        if exc is None and self._answering is not None and self._answering.their_state is h11.SEND_BODY:
+            self.data_received(b"")  # a body without a length ends with the connection
         self._fail(LinkLost(f"the connection broke: {exc}" if exc else "the robot hung up"))
 
     def data_received(self, data: bytes) -> None:
-        if self._parser is None:
+        if self._answering is None:
             self._fail(BadAnswer("the robot talks without being asked"))
             return
         try:
-            self._parser.feed_data(data)
-        except httptools.HttpParserError as error:
-            self._fail(BadAnswer(f"not HTTP: {error.__context__ or error}"))
+            self._answering.receive_data(data)
+            while self._answering is not None and self._take(self._answering.next_event()):
+                pass
+        except h11.RemoteProtocolError as error:
+            self._fail(LinkLost("the robot hung up") if not data else BadAnswer(f"not HTTP: {error}"))
+        except BadAnswer as error:
+            self._fail(error)
 
-    async def ask(self, head: bytes, body: bytes) -> Answer:
+    async def ask(self, method: str, head: bytes, body: bytes) -> Answer:
         """Send a request and return the answer; cancelling the wait closes the connection."""
         assert self.transport is not None
-        self._parser, self._answer, self._head_bytes = httptools.HttpResponseParser(self), Answer(), 0
+        self._answering, self._answer = _awaiting_answer(method), Answer()
         self._waiting = asyncio.get_running_loop().create_future()
         self.transport.write(head + body if len(body) < HEAD_MAX else head)
         if len(body) >= HEAD_MAX:
@@ -84,37 +89,40 @@ class _Connection(asyncio.Protocol):
         if self._waiting is not None and not self._waiting.done():
             self._waiting.set_exception(error)
 
-    # -- called by the parser --
+    def _take(self, event: object) -> bool:
+        """Take one part of the answer; return False if it was the last that is there. Raises BadAnswer."""
+        match event:
+            case h11.Response(status_code=status, reason=reason, headers=headers):
+                if sum(len(name) + len(value) for name, value in headers) + len(reason) > HEAD_MAX:
+                    raise BadAnswer(f"more than {HEAD_MAX} bytes of headers")
+                self._answer.status, self._answer.reason = status, bytes(reason).decode("utf-8", "replace")
+                self._answer.content_type = dict(headers).get(b"content-type", b"").decode("latin-1")
+            case h11.Data(data=body):
+                if len(self._answer.body) + len(body) > BODY_MAX:
+                    raise BadAnswer(f"more than {BODY_MAX} bytes")
+                self._answer.body += body
+            case h11.EndOfMessage():
+                self._finish()
+                return False
+        return event is not h11.NEED_DATA
 
-    def on_status(self, status: bytes) -> None:
-        self._measure(status)
-        self._answer.reason += status.decode("utf-8", "replace")
-
-    def on_header(self, name: bytes, value: bytes) -> None:
-        self._measure(name + value)
-        if name.lower() == b"content-type":
-            self._answer.content_type = value.decode("latin-1")
-
-    def on_body(self, body: bytes) -> None:
-        if len(self._answer.body) + len(body) > BODY_MAX:
-            raise BadAnswer(f"more than {BODY_MAX} bytes")
-        self._answer.body += body
-
-    def on_message_complete(self) -> None:
-        parser, self._parser = self._parser, None
-        assert parser is not None
-        self._answer.status = parser.get_status_code()
-        if not parser.should_keep_alive():
+    def _finish(self) -> None:
+        answering, self._answering = self._answering, None
+        assert answering is not None
+        if answering.their_state is not h11.DONE or answering.trailing_data[0]:  # it does not keep the connection
             self.open = False
             if self.transport is not None:
                 self.transport.close()
         if self._waiting is not None and not self._waiting.done():
             self._waiting.set_result(self._answer)
 
-    def _measure(self, more: bytes) -> None:
-        self._head_bytes += len(more)
-        if self._head_bytes > HEAD_MAX:
-            raise BadAnswer(f"more than {HEAD_MAX} bytes of headers")
+
+def _awaiting_answer(method: str) -> h11.Connection:
+    """Return the state of a connection on which a request was sent."""
+    connection = h11.Connection(h11.CLIENT, max_incomplete_event_size=HEAD_MAX)
+    connection.send(h11.Request(method=method, target="/", headers=[("host", "robot")]))
+    connection.send(h11.EndOfMessage())
+    return connection
 
 
 class HttpLink:
@@ -148,15 +156,15 @@ class HttpLink:
             kept = self._kept()
             if kept is not None:
                 try:
-                    return await self._use(kept, head, body)
+                    return await self._use(kept, method, head, body)
                 except LinkLost:
                     if method != "GET":
                         raise
-            return await self._use(await self._connect(), head, body)
+            return await self._use(await self._connect(), method, head, body)
 
-    async def _use(self, connection: _Connection, head: bytes, body: bytes) -> Answer:
+    async def _use(self, connection: _Connection, method: str, head: bytes, body: bytes) -> Answer:
         try:
-            answer = await connection.ask(head, body)
+            answer = await connection.ask(method, head, body)
         finally:
             if connection.open:
                 self._idle.append(connection)
