@@ -127,3 +127,19 @@ async def test_opened_program_is_no_change(studio: Open) -> None:
     await until(page, f"studio.editor.changes.value === {changes + 2}")
     assert await page.evaluate(saved) > before
     assert page.errors == []
+
+
+async def test_programs_without_names_differ_in_the_list(studio: Open) -> None:
+    """Pupils name few programs, and those of a robot are in one list."""
+    page = await studio()
+    named = "p.list().then((all) => all.find(({ id }) => id === studio.program.value.id).describe)"
+    found = []
+    for _ in range(2):
+        await page.evaluate("import('/studio/program.js').then((p) => p.fresh())")
+        await loaded(page, COUNTING)
+        await page.evaluate("import('/studio/program.js').then((p) => p.keepNow())")
+        found.append(await page.evaluate(f"import('/studio/program.js').then((p) => {named})"))
+        await shows(page, "document.querySelector('.name input').placeholder", found[-1])
+    assert len(set(found)) == 2
+    assert all(name.startswith("My program") for name in found)
+    assert page.errors == []

@@ -12,7 +12,7 @@ import { connect, online, open, opened, unopened } from "./link.js";
 import { Inside } from "./modules.js";
 import { Missions, allowHere, forget, loadMissions, missions } from "./missions.js";
 import { Output, Python, RobotPanel, TextEditor, Values } from "./panels.js";
-import { body, changed, handOver, keepNow, list, program, rename, restore, stored } from "./program.js";
+import { body, changed, handOver, keepNow, list, program, rename, restore, stored, unnamed } from "./program.js";
 import * as runner from "./runner.js";
 import * as text from "./text.js";
 
@@ -44,7 +44,7 @@ function Header() {
     <a class="brand" href="/" title=${t("studio.console")}><img src="/icon.svg" alt="" width="28" height="28" /><b>${t("studio")}</b></a>
     <label class="robot"><span>${t("robot")}</span>
       <select value=${current.value} onChange=${(e) => { choose(e.target.value); open(); }}>${robots.map((r) => html`<option>${r.name}</option>`)}</select></label>
-    <label class="name"><span class="unseen">${t("studio.name")}</span><input value=${program.value.name} placeholder=${t("studio.untitled")} maxlength="60" onChange=${(e) => rename({ name: e.target.value })} /></label>
+    <label class="name"><span class="unseen">${t("studio.name")}</span><input value=${program.value.name} placeholder=${unnamed(program.value.id)} maxlength="60" onChange=${(e) => rename({ name: e.target.value })} /></label>
     <span class="stored muted" role="status" title=${stored.value && t(`studio.stored.${stored.value}`)}>${stored.value && t(`studio.stored.${stored.value}`)}</span>
     <span class="grow"></span>
     <label class="looks"><span class="unseen">${t("studio.look")}</span><select value=${editor.look.value} onChange=${(e) => { editor.look.value = e.target.value; }}>${looks.map((l) => html`<option value=${l}>${t(`studio.look.${l}`)}</option>`)}</select></label>

@@ -88,16 +88,26 @@ export function back(version) {
 
 export function versions() { try { return JSON.parse(localStorage.getItem(`studio.versions.${program.value.id}`) ?? "[]"); } catch { return []; } }
 
-const described = (/** @type {string} */ name) => (name || t("studio.untitled")).replaceAll('"""', "'");
+/** The name of a program that was given none: of several on a robot the later ones have a number. @param {string} id */
+export function unnamed(id) {
+  const plain = t("studio.untitled"), own = listed.value.find((one) => one.id === id)?.describe;
+  if (own?.startsWith(plain)) return own;
+  const taken = new Set(listed.value.map((one) => one.describe));
+  let name = plain;
+  for (let n = 2; taken.has(name); n++) name = `${plain} ${n}`;
+  return name;
+}
+
+const described = (/** @type {{name: string, id: string}} */ of) => (of.name || unnamed(of.id)).replaceAll('"""', "'");
 /** The frame that saves a program. @param {any} [of] as ``whole`` makes it */
 export const saveFrame = (of = whole()) => frame({
-  type: "task", operate: "save", target_id: [of.id], describe: described(of.name),
+  type: "task", operate: "save", target_id: [of.id], describe: described(of),
   style: of.id === program.value.id ? style() : JSON.stringify(of.style ?? { roboglot: { kind: "text" } }), mode: "single", condition: "now", body: of.body });
 
 /** Whether the robot has exactly this program, and it is right: then it need not be saved and checked before it runs. */
 export async function isStored() {
   const { program: found } = await ask({ type: "fetch", program: program.value.id, log: false });
-  return Boolean(found) && found.describe === described(program.value.name) && found.body === python() && found.style === style() && found.state !== "error" && found.mode === "single" && found.condition === "now";
+  return Boolean(found) && found.describe === described(program.value) && found.body === python() && found.style === style() && found.state !== "error" && found.mode === "single" && found.condition === "now";
 }
 
 /** Save what is about to run; the save that its last change has waiting is then not needed. */
