@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import dataclasses
+import gc
+import os
 import socket
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+
+import pytest
 
 from roboglot.config import Config, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
@@ -87,6 +91,18 @@ async def test_no_lockstep_time_passes_while_the_disk_works(tmp_path: Path) -> N
     assert written == [0.1 * number for number in range(10)]
     assert all(task.done() for task in keeping)
     await started.close()
+
+
+async def test_failed_start_leaves_its_folder_free(tmp_path: Path) -> None:
+    """In a process that goes on: a test, a notebook, a shard's next try."""
+    right = config(tmp_path / "data")
+    await Runtime(right).close()
+    gc.collect()
+    before = set(os.listdir("/proc/self/fd"))
+    with pytest.raises((ValueError, OSError), match="nowhere"):
+        Runtime(dataclasses.replace(right, world="nowhere"))
+    assert set(os.listdir("/proc/self/fd")) == before
+    await Runtime(right).close()
 
 
 async def test_a_robot_that_restarts_takes_its_doors_along(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import dataclasses
 import gc
 import logging
@@ -66,11 +67,22 @@ class Runtime:
         """``class_home``: a classroom that this world shares with others; None: a classroom of its own."""
         refuse_unguarded(config)
         self.config, self._class_home = config, class_home
-        self._lock = lock_folder(config.data)
+        self._files = contextlib.ExitStack()  # the lock, databases and the list of people
+        try:
+            self._build(doors)
+        except BaseException:
+            self._files.close()
+            raise
+
+    def _build(self, doors: tuple[DoorType, ...]) -> None:
+        """Build everything; what is opened here is closed by ``_files``."""
+        config = self.config
+        self._files.callback(os.close, lock_folder(config.data))
         self.clock = clock_of(config)
         file, names = config.data / "roboglot.db", [robot.name for robot in config.robots]
         self._has_data = file.exists() or bool(config.database)
         self._database = open_database(file, config.database, names, in_place=config.lockstep)
+        self._files.callback(self._database.close)
         limits = dataclasses.asdict(config.programs)
         self._memory_together = limits.pop("memory_together")
         self._engine: Engine | None = None
@@ -82,6 +94,8 @@ class Runtime:
         self._registry_lease = self._join_registry()
         self._access_database: Transactions | None = None  # on a server: the list of people and the audit
         self.guard = self._build_guard() if config.access.on else None
+        if self.guard is not None:
+            self._files.callback(self.guard.close)
         self._gateway: Gateway | None = None
         self._tls = self._build_tls()
         self.leases = LeaseServer(
@@ -101,6 +115,7 @@ class Runtime:
         if not where:
             return None
         self._registry = open_registry(where)
+        self._files.callback(self._registry.close)
         leases = {name: robot[Lease] for name, robot in self.fleet.robots.items()}
         addresses = {robot.name: robot.address for robot in self.config.robots}
         registry_lease = RegistryLease(
@@ -123,6 +138,7 @@ class Runtime:
             self._access_database = self._registry
         elif database:
             self._access_database = open_registry(database)
+            self._files.callback(self._access_database.close)
         if database and (unused := self.config.data / FILE).exists():
             log.warning("the list of people in %s is not used, but the database's: see `roboglot access copy`", unused)
         return Guard(self.config.data, self.config.access, self.fleet.robots, shared=self._access_database)
@@ -295,14 +311,7 @@ class Runtime:
             await close_in_time("the gateway", self._gateway.close())
         if self._registry_lease is not None:
             await self._registry_lease.close()
-        if self.guard is not None:
-            self.guard.close()
-        if self._registry is not None:
-            self._registry.close()
-        if self._access_database is not None and self._access_database is not self._registry:
-            self._access_database.close()
-        self._database.close()
-        os.close(self._lock)
+        self._files.close()
 
     async def _close_recorder(self) -> None:
         if self._recorder is not None:
