@@ -46,7 +46,7 @@ FREE_FLOOR = """() => {
 }"""
 LOW = """() => import('/link.js').then((link) => {
     const { a } = link.states.value, level = 'WARNING', name = 'battery low';
-    const battery = { ...a.battery, remaining: 1380 }, faults = [{ id: 1, name, level, message: name }];
+    const battery = { ...a.battery, remaining: 1380 }, faults = [{ id: 1, name, level, message: 'low battery' }];
     link.states.value = { a: { ...a, battery, faults } };
 })"""
 DRAWN = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done())))"
@@ -120,7 +120,7 @@ async def test_phone_shows_and_can_touch_everything(served: Served, open_console
 
 
 async def test_times_and_faults_are_said_once(served: Served, open_console: OpenConsole) -> None:
-    """A time known to the minute has no seconds; a fault whose sentence is its name has it once."""
+    """A time known to the minute has no seconds; a fault whose sentence has the words of its name has them once."""
     page = await open_console()
     await page.wait_for_selector("text=Scan fits map")
     await page.evaluate(LOW)

@@ -48,11 +48,13 @@ function Row({ name, children, kind = "" }) {
   return html`<div class=${`row ${kind}`}><dt>${name}</dt><dd>${children}</dd></div>`;
 }
 
+const bag = (/** @type {string} */ words) => words.split(" ").sort().join();
+
 function Faults() {
   const faults = state.value.faults;
   if (!faults.length) return stale.value ? null : html`<p class="allwell">${t("faults.none")}</p>`;
   return html`<ul class="faults">${faults.map((f) => html`<li class=${f.level.toLowerCase()}><${Icon} name="alert" size=${18} />
-    <span><b>${robotWord(f.name)}</b>${robotWord(f.message) !== robotWord(f.name) && html`<small>${robotWord(f.message)}</small>`}</span></li>`)}</ul>`;
+    <span><b>${robotWord(f.name)}</b>${bag(robotWord(f.message)) !== bag(robotWord(f.name)) && html`<small>${robotWord(f.message)}</small>`}</span></li>`)}</ul>`;
 }
 
 /** Seconds that are known to the minute. @param {number} seconds */
