@@ -51,7 +51,7 @@ class Ready(msgspec.Struct, tag=True, frozen=True):
 
 
 class Beat(msgspec.Struct, tag=True, frozen=True):
-    """Message of a shard, once a second. ``factor``: robot time over wanted robot time since the last one.
+    """Message of a shard, once a second. ``factor``: robot time over wanted robot time of the last seconds.
 
     ``memory``: proportional set size (bytes); ``cpu``: processor time used so far (s).
     """

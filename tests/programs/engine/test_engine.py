@@ -145,7 +145,8 @@ async def test_opening_later_takes_nothing_from_the_start() -> None:
 
 
 async def test_opening_later_needs_no_program(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.programs.engine.engine.OPENS_AFTER", 0.05)
+    monkeypatch.setattr("roboglot.programs.engine.engine.OPENS_AFTER", 0.0)
+    monkeypatch.setattr("roboglot.programs.engine.engine.OPENS_WITHIN", 0.1)
     engine = Engine()
     engine.open_later()
     await until(lambda: "seccomp" in engine.layers)

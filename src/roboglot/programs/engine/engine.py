@@ -16,6 +16,7 @@ import fcntl
 import logging
 import mmap
 import os
+import random
 import secrets
 import signal
 import socket
@@ -54,8 +55,9 @@ ANSWER_MAX = 60.0
 """Longest wait for a worker's start and for a program's check, in the machine's seconds."""
 ENDS_MAX = 5.0
 """Longest wait for killed programs before the zygote is ended, in the machine's seconds."""
-OPENS_AFTER = 5.0
-"""Delay of ``open_later``: by then, doors and worlds that start beside this one are open; in the machine's seconds."""
+OPENS_AFTER, OPENS_WITHIN = 5.0, 10.0
+"""Delay of ``open_later``, by when doors and worlds that start beside this one are open; how far it is spread by
+chance, so that those of many worlds do not hold them up together; in the machine's seconds."""
 STEPS_BACK_AFTER = 0.5
 """Delay before a program moves to the control group, which is slow in the kernel, and before the zygote's session
 yields, so that the first program begins soon; in the machine's seconds."""
@@ -111,7 +113,8 @@ class Engine:
     def open_later(self) -> None:
         """Start the zygote in the background once this program has started, so that it takes no time from that."""
         if self._background is None:
-            self._background = asyncio.create_task(self._try_open(OPENS_AFTER))
+            delay = random.uniform(OPENS_AFTER, OPENS_AFTER + OPENS_WITHIN)
+            self._background = asyncio.create_task(self._try_open(delay))
 
     async def open(self) -> None:
         """Start the zygote if it isn't running. Raises SandboxUnavailable, EngineError after ``close``."""
