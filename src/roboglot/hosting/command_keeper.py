@@ -20,7 +20,6 @@ from roboglot.hosting.leftovers import MARK, adopt_orphans, end_descendants
 LENGTH = struct.Struct("!I")
 STATUS = struct.Struct("!i")
 NOT_RUN = 126  # exit status, as a shell's
-KEEPER = "roboglot.hosting.command_keeper"
 
 
 def received(link: socket.socket) -> tuple[str, int] | None:
@@ -44,7 +43,7 @@ def send(link: socket.socket, command: str, output: int) -> None:
 
 
 class _Children:
-    """The children of this process, of which a pipe tells when one has ended."""
+    """The children of this process, with a pipe that can be read when one has ended."""
 
     def __init__(self) -> None:
         self.ended, wakes = os.pipe()
