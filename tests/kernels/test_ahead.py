@@ -7,6 +7,7 @@ import hashlib
 import logging
 import subprocess
 import sys
+import threading
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.model.errors import NotReady, Refused
 from roboglot.model.events import FaultRaised
 from roboglot.model.geometry import Point
+from roboglot.simulation.world import world
 from roboglot.storage.database import Database
 
 UNAVAILABLE = "navigation unavailable"
@@ -83,6 +85,21 @@ async def test_robots_share_one_compiler(cache: Path, monkeypatch: pytest.Monkey
     assert "linear" not in missing()
 
 
+async def test_looking_for_kernels_delays_no_start(fleet_of_one: Fleet, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the first time, it reads the sources: that takes as long as opening all doors."""
+    looked = set[threading.Thread]()
+
+    def look(*modules: object) -> list[str]:
+        looked.add(threading.current_thread())
+        return missing(*modules)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(world, "missing", look)
+    monkeypatch.setattr(skills, "missing", look)
+    await fleet_of_one.start(wait=True)
+    assert looked
+    assert threading.main_thread() not in looked
+
+
 async def test_an_unwritable_cache_is_one_sentence(no_cache: None) -> None:
     with pytest.raises(KernelsUnavailable, match="cannot hold compiled kernels"):
         compile_ahead(["linear"])
@@ -120,8 +137,9 @@ async def test_navigation_is_not_ready_while_compiling(
     monkeypatch.setattr(skills, "compile_beside", compile_slowly)
     robot = fleet_of_one.robots["a"]
     await fleet_of_one.start(wait=False)
-    await asyncio.sleep(0)
-    assert robot[Health].has(UNAVAILABLE)
+    async with asyncio.timeout(60):
+        while not robot[Health].has(UNAVAILABLE):  # noqa: ASYNC110 - a thread looks for them
+            await asyncio.sleep(0.001)
     assert "robot a can be driven, seen and programmed; maps, localization and navigation follow" in caplog.text
     with pytest.raises(NotReady, match="warming up"):
         robot[Navigation].navigate_to([Point(1.0, 0.0)], NavigationOptions())

@@ -207,7 +207,7 @@ class Autonomy:
         With ``wait`` there is no fault meanwhile: no time passes, and a lockstep run is the same on every machine.
         """
         begun = perf_counter()
-        if lacking := missing(NAVIGATION):
+        if lacking := await load(lambda: missing(NAVIGATION)):  # at the first time, it reads the sources
             log.info(
                 "robot %s can be driven, seen and programmed; maps, localization and navigation follow when %d kernels"
                 " are compiled, once after an installation",

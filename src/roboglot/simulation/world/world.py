@@ -18,7 +18,7 @@ import numpy as np
 from roboglot.config import serial_of
 from roboglot.extras import own_version
 from roboglot.kernels import WORLD
-from roboglot.kernels.ahead import KernelsUnavailable, compile_beside
+from roboglot.kernels.ahead import KernelsUnavailable, compile_beside, missing
 from roboglot.model.background import load
 from roboglot.model.clock import Clock
 from roboglot.model.geometry import Pose
@@ -211,7 +211,8 @@ class World:
     async def _load_kernels(self) -> None:
         """Switch the sensors to the compiled kernels; missing ones are compiled first, in a separate process."""
         with contextlib.suppress(KernelsUnavailable):  # autonomy reports it; sensors continue without it
-            await compile_beside(WORLD)
+            if await load(lambda: missing(WORLD)):  # at the first time, it reads the sources
+                await compile_beside(WORLD)
             await load(self._use_kernels)
 
     def _use_kernels(self) -> None:
