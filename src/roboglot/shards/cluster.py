@@ -66,7 +66,7 @@ class Actor(Protocol):
 
 
 class ClusterFleet:
-    """One fleet on a joined cluster. ``lasting``: its shards outlive this program, which a file in the folder tells."""
+    """One fleet on a joined cluster. ``lasting``: its shards outlive this program; a file in the folder names it."""
 
     def __init__(self, plan: FleetPlan, folder: Path, where: str, *, lasting: bool = False) -> None:
         """``folder``: locked for this program."""

@@ -178,6 +178,17 @@ async def test_answers_of_every_length_are_read(
         assert (await client.get_pose()).x == 1.0
 
 
+@pytest.mark.parametrize("method", ["HEAD", "CONNECT", "DO IT", "", "\t"])
+async def test_any_method_of_a_recording_is_sent(
+    fake: Callable[[Reply], Awaitable[SlamwareClient]], method: str
+) -> None:
+    """The robot refuses what is no method, not the client."""
+    body = b"" if method == "HEAD" else POSE
+    client = await fake(answering(b"HTTP/1.1 400 No\r\ncontent-length: %d\r\n\r\n%s" % (len(POSE), body)))
+    answer = await client._link.ask(method, "/x", b"", "", 60.0)
+    assert (answer.status, answer.reason, bytes(answer.body)) == (400, "No", body)
+
+
 async def test_more_than_was_asked_for_ends_the_connection(
     fake: Callable[[Reply], Awaitable[SlamwareClient]],
 ) -> None:
