@@ -185,12 +185,18 @@ async def test_a_full_disk_is_only_read(database: Transactions) -> None:
     room = Room()
     own = database.on(room)
     await StoredSettings(own, "a").put("x", 1)
+    await StoredLedger(own, "a").write("kind", {"first": 1})
     room.left = 0
     with pytest.raises(DiskFull):
         await StoredSettings(own, "a").put("x", 2)
     with pytest.raises(StoreError):
         await Outbox(own, "a").put("more")
     assert StoredSettings(own, "a").get("x") == 1
+    ledger = StoredLedger(own, "a")
+    with pytest.raises(DiskFull):
+        await ledger.write("kind", {"second": 2}, forget=["first"])
+    await ledger.write("kind", {}, forget=["first"])
+    assert ledger.all("kind") == []
     await StoredSettings(database, "b").put("x", 3)  # another robot's disk has room
 
 

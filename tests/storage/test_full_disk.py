@@ -1,4 +1,4 @@
-"""A robot whose disk is full reads what it has and keeps nothing new; the others do not notice."""
+"""A robot whose disk is full reads and deletes what it has, and keeps nothing new; the others do not notice."""
 
 import logging
 from pathlib import Path
@@ -8,6 +8,8 @@ import pytest
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import Refused
+from roboglot.model.geometry import Pose
+from roboglot.model.maps import PointOfInterest
 from roboglot.storage.database import Database
 from roboglot.storage.transactions import DiskFull
 
@@ -20,7 +22,7 @@ async def test_writing_is_refused_until_there_is_room_again(fleet, world):
     with pytest.raises(Refused, match="disk is full"):
         await first.put("kept", 2)
     with pytest.raises(Refused, match="disk is full"):
-        await fleet.robots["a"][Places].clear()
+        await fleet.robots["a"][Places].put(PointOfInterest("new", Pose()))
     assert first.get("kept") == 1
     await second.put("kept", 3)
     assert second.get("kept") == 3

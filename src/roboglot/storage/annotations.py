@@ -12,6 +12,8 @@ from roboglot.model.components.mapping.annotations import Annotations, MapAnnota
 from roboglot.model.events import AnnotationsChanged, EventStream
 from roboglot.storage.transactions import Connection, Transactions
 
+KINDS = "lines", "areas", "docks", "landmarks"  # fields of annotations that hold entries with ids
+
 
 class StoredAnnotations(MapAnnotations):
     """The annotations of one robot."""
@@ -32,7 +34,8 @@ class StoredAnnotations(MapAnnotations):
     async def change(self, edit: Callable[[Annotations], Annotations]) -> None:
         async with self.turn:
             changed = edit(self._current)
-            await self._database.run(self.writing(changed))
+            write = self._database.remove if _fewer(changed, self._current) else self._database.run
+            await write(self.writing(changed))
             self.adopt(changed)
 
     def writing(self, changed: Annotations) -> Callable[[Connection], object]:
@@ -48,3 +51,10 @@ class StoredAnnotations(MapAnnotations):
         """Adopt written annotations, and publish the change."""
         self._current = changed
         self._events.publish(AnnotationsChanged(stamp=self._clock.time()))
+
+
+def _fewer(changed: Annotations, before: Annotations) -> bool:
+    """Return whether a change removes annotations, and neither adds nor alters any."""
+    was = {(name, entry.id): entry for name in KINDS for entry in getattr(before, name)}
+    entries = [((name, entry.id), entry) for name in KINDS for entry in getattr(changed, name)]
+    return len(entries) < len(was) and all(was.get(key) == entry for key, entry in entries)

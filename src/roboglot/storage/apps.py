@@ -65,7 +65,7 @@ class StoredApps(Apps):
     async def remove(self, name: str) -> None:
         if name not in self._apps:
             raise NotFound(f"no app is named {name!r}")
-        await self._database.run(lambda connection: self._delete(connection, name))
+        await self._database.remove(lambda connection: self._delete(connection, name))
         self._apps.pop(name, None)
         self._disk.release(_place(name))
 

@@ -45,8 +45,8 @@ class Database:
         self._disk: Disk | None = None
         self._together: list[tuple[Database, Work, asyncio.Future[Any]]] = []  # shared by the copies for single robots
 
-    def on(self, disk: Disk) -> Database:
-        """Return the same file for the robot with this disk: while the disk is full, writing raises Refused."""
+    def on(self, disk: Disk | None) -> Database:
+        """Return the same file for the robot with this disk: while the disk is full, only ``remove`` may write."""
         database = copy.copy(self)
         database._disk = disk
         return database
@@ -59,6 +59,10 @@ class Database:
         if self._in_place:
             return self.run_now(work)
         return await _outcome(asyncio.get_running_loop().run_in_executor(self._thread, self._transact, work))
+
+    async def remove(self, work: Callable[[Connection], T]) -> T:
+        """Run ``work`` that takes no room, as ``run`` does, also while the robot's disk is full."""
+        return await self.on(None).run(work)
 
     async def read(self, work: Callable[[Connection], T]) -> T:
         """Run read-only ``work`` beside writing transactions, without waiting for a flush of the disk.

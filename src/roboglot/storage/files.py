@@ -59,7 +59,7 @@ class StoredFiles(FileStore):
         return work
 
     async def remove(self, name: str) -> None:
-        removed = await self._database.run(
+        removed = await self._database.remove(
             lambda c: c.execute("DELETE FROM file WHERE robot=? AND name=?", (self._robot, name)).rowcount
         )
         if not removed:

@@ -44,7 +44,8 @@ class DatabaseJournalStore:
 
     async def remove(self, id: str) -> None:
         """Delete a journal."""
-        await self._run(lambda connection: self._remove(connection, [id]))
+        with store_errors():
+            await self._database.on(None).run_together(lambda connection: self._remove(connection, [id]))
 
     async def entries(self, id: str) -> list[JournalEntry]:
         """Return all calls in order."""

@@ -36,4 +36,4 @@ class StoredLedger(Ledger):
                 "DELETE FROM ledger WHERE robot=? AND kind=? AND id=?", [(self._robot, kind, id) for id in forget]
             )
 
-        await self._database.run(work)
+        await (self._database.run(work) if rows else self._database.remove(work))

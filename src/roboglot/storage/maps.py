@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import zlib
 from collections.abc import Callable, Sequence
+from dataclasses import fields
+from functools import partial
 
 import numpy as np
 
@@ -13,7 +15,7 @@ from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.geodesy import GlobeAnchor
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
-from roboglot.storage.transactions import Connection, Transactions
+from roboglot.storage.transactions import Connection, DiskFull, Transactions
 
 MAPS_MAX = 100
 
@@ -45,12 +47,18 @@ class StoredMaps(MapLibrary):
         await self._database.run(lambda connection: self._put(connection, row))
 
     async def modify(self, name: str, edit: Callable[[StoredMap], StoredMap]) -> None:
-        def work(connection: Connection) -> None:
+        def work(connection: Connection, *, full: bool = False) -> None:
             old = self._load(connection, name)
-            if (new := edit(old)) is not old:
+            new = edit(old)
+            if full and not _only_loses_labels(old, new):
+                raise DiskFull("the disk is full")
+            if new is not old:
                 self._put(connection, self._packed(new))
 
-        await self._database.run(work)
+        try:
+            await self._database.run(work)
+        except DiskFull:
+            await self._database.remove(partial(work, full=True))
 
     def _load(self, connection: Connection, name: str) -> StoredMap:
         row = connection.execute(
@@ -111,11 +119,16 @@ class StoredMaps(MapLibrary):
         )
 
     async def remove(self, name: str) -> None:
-        removed = await self._database.run(
+        removed = await self._database.remove(
             lambda c: c.execute("DELETE FROM map WHERE robot=? AND name=?", (self._robot, name)).rowcount
         )
         if not removed:
             raise NotFound(f"no map {name!r}")
+
+
+def _only_loses_labels(old: StoredMap, new: StoredMap) -> bool:
+    same = all(getattr(new, one.name) is getattr(old, one.name) for one in fields(old) if one.name != "labels")
+    return same and set(new.labels) < set(old.labels)
 
 
 def _anchor_text(anchor: GlobeAnchor | None) -> str | None:

@@ -59,7 +59,7 @@ class StoredMembers(Members):
 
     async def remove(self, name: str) -> None:
         member = self.get(name)
-        await self._database.run(lambda c: c.execute("DELETE FROM member WHERE id=?", (member.id,)))
+        await self._database.remove(lambda c: c.execute("DELETE FROM member WHERE id=?", (member.id,)))
         self._members.pop(name, None)
         self._publish()
 
@@ -78,7 +78,8 @@ class StoredMembers(Members):
 
     async def _update(self, member: Member, column: str, value: object) -> None:
         """Update one column; ``column`` is a constant of ours, never input."""
-        await self._database.run(lambda c: c.execute(f"UPDATE member SET {column}=? WHERE id=?", (value, member.id)))
+        write = self._database.remove if value is None else self._database.run
+        await write(lambda c: c.execute(f"UPDATE member SET {column}=? WHERE id=?", (value, member.id)))
 
     def _check_free(self, name: str) -> None:
         if not name.strip() or len(name) > NAME_MAX or not name.isprintable():

@@ -36,6 +36,6 @@ class Outbox:
 
     async def remove(self, number: int) -> None:
         """Delete a document that was sent, or never will be."""
-        await self._database.run(
+        await self._database.remove(
             lambda connection: connection.execute("DELETE FROM cloud_outbox WHERE seq=?", (number,))
         )

@@ -53,7 +53,9 @@ class StoredPlaces(Places):
     async def change(self, edit: Callable[[Sequence[PointOfInterest]], Sequence[PointOfInterest]]) -> None:
         async with self.turn:
             places = edit(self.all())
-            await self._database.run(self.writing(places, alone=True))
+            fewer = all(self._places.get(place.id) == place for place in places)
+            write = self._database.remove if fewer else self._database.run
+            await write(self.writing(places, alone=True))
             self._places = {place.id: place for place in places}
         self._publish()
 
@@ -83,13 +85,15 @@ class StoredPlaces(Places):
     async def remove(self, id: str) -> None:
         async with self.turn:
             self.get(id)
-            await self._database.run(lambda c: c.execute("DELETE FROM place WHERE robot=? AND id=?", (self._robot, id)))
+            await self._database.remove(
+                lambda c: c.execute("DELETE FROM place WHERE robot=? AND id=?", (self._robot, id))
+            )
             self._places.pop(id, None)
         self._publish()
 
     async def clear(self) -> None:
         async with self.turn:
-            await self._database.run(lambda c: c.execute("DELETE FROM place WHERE robot=?", (self._robot,)))
+            await self._database.remove(lambda c: c.execute("DELETE FROM place WHERE robot=?", (self._robot,)))
             self._places.clear()
         self._publish()
 

@@ -85,8 +85,8 @@ class PostgreSQL:
             log.warning(EXPOSED)
         self._lock_timeout = 0  # who loses a robot later must not wait for it
 
-    def on(self, disk: Disk) -> PostgreSQL:
-        """Return the same database for the robot with this disk: while the disk is full, writing raises DiskFull."""
+    def on(self, disk: Disk | None) -> PostgreSQL:
+        """Return the same database for the robot with this disk: while the disk is full, only ``remove`` may write."""
         database = copy.copy(self)
         database._disk = disk
         return database
@@ -102,6 +102,10 @@ class PostgreSQL:
         return await asyncio.get_running_loop().run_in_executor(self._threads, writing)
 
     run_together = run  # the server itself combines disk flushes of transactions that end together
+
+    async def remove(self, work: Callable[[Connection], T]) -> T:
+        """Run ``work`` that takes no room, as ``run`` does, also while the robot's disk is full."""
+        return await self.on(None).run(work)
 
     async def read(self, work: Callable[[Connection], T]) -> T:
         """Run read-only ``work`` beside writing transactions."""

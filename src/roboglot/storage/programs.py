@@ -141,7 +141,8 @@ class DatabaseProgramStore:
             connection.execute("DELETE FROM program_log WHERE robot=? AND kind=? AND id=?", (*self._key, id))
             self._forget_uses(connection, id)
 
-        await self._run(work)
+        with store_errors():
+            await self._database.remove(work)
 
     async def append_log(self, id: str, entries: Sequence[LogEntry]) -> None:
         """Append entries to a program's log."""

@@ -58,11 +58,14 @@ class Transactions(Protocol):
     Calls of ``run`` and ``run_together`` by one caller are done in their order.
     """
 
-    def on(self, disk: Disk) -> Self:
-        """Return the same database for the robot with this disk: while the disk is full, writing raises DiskFull."""
+    def on(self, disk: Disk | None) -> Self:
+        """Return the same database for the robot with this disk: while the disk is full, only ``remove`` may write."""
 
     async def run(self, work: Callable[[Connection], T]) -> T:
         """Run ``work``; it is stored when this returns."""
+
+    async def remove(self, work: Callable[[Connection], T]) -> T:
+        """Run ``work`` that takes no room: it removes rows, or replaces one by a shorter one. A full disk allows it."""
 
     async def run_together(self, work: Callable[[Connection], T]) -> T:
         """Run frequent ``work`` of many callers; works that wait at the same time may share one flush."""

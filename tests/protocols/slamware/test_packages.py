@@ -45,10 +45,11 @@ async def test_an_update_from_the_maker(robot: Robot, client: httpx.AsyncClient,
     assert (await client.post(f"{FIRMWARE}/autoupdate/:start")).json()["result"] is False
 
 
-async def test_apps_are_listed_and_removed(robot: Robot, client: httpx.AsyncClient) -> None:
+async def test_apps_are_listed_and_removed(robot: Robot, world: World, client: httpx.AsyncClient) -> None:
     apps = "/api/core/application/v1/apps"
     await robot[Apps].install("org.example", "1.2", io.BytesIO(b"package"))
     assert (await client.get(apps)).json() == [{"name": "org.example", "version": "1.2"}]
+    world.faults.inject("full_disk", "a")
     assert (await client.delete(f"{apps}/org.example")).status_code == 200
     assert (await client.delete(f"{apps}/org.example")).status_code == 404
 

@@ -63,6 +63,10 @@ async def test_nothing_is_saved_on_a_full_disk(connect: Connect, robot: Robot, w
     [answer] = await app.ask("run", "t1")  # existing tasks run
     assert answer["state"] == 0
     await app.ends("t1")
+    [answer] = await app.ask("delete", "t1")
+    assert answer["state"] == 0
+    [listed] = await app.ask("inquiry")
+    assert listed["list"] == []
     world.faults.clear()
     assert (await app.save("t1", "pass"))["state"] == 0
 

@@ -179,6 +179,25 @@ async def test_a_map_that_fits_into_no_message(client, robot, side: int, answer:
     assert "map" not in got or got["map"]["data"] == []
 
 
+async def test_full_disk_lets_labels_and_maps_be_deleted(client, world, robot: Robot) -> None:
+    labels = [{"labelName": name, "physicX": 1, "physicY": 2} for name in ("sofa", "door")]
+    grid = OccupancyGrid(np.zeros((4, 4), np.int8), 0.05, Point())
+    await robot[MapLibrary].put(StoredMap("home", grid, 0.0))
+    assert await client.ask(6002, {"mapName": "home", "locationLabelInfo": labels}) == {"success": 0}
+    await client.ask(1020, {"member": "anna"})
+    world.faults.inject("full_disk", "a")
+    bed = {"labelName": "bed", "physicX": 1, "physicY": 2}
+    refused = await client.ask(6002, {"mapName": "home", "locationLabelInfo": [*labels, bed]})
+    assert refused.get("success") != 0
+    sofa = {"mapName": "home", "locationLabelInfo": [{"labelName": "sofa"}], "only_delete": True}
+    assert await client.ask(6002, sofa) == {"success": 0}
+    assert (await client.ask(6003, {"mapName": "home"}))["locationLabelInfo"] == labels[1:]
+    assert await client.ask(6002, {"mapName": "home", "only_delete": True}) == {"success": 0}
+    assert await robot[MapLibrary].names() == []
+    assert await client.ask(1022, {"member": "anna"}) == {"success": True}
+    assert (await client.ask(1021))["accounts"] == []
+
+
 async def test_labels_are_set_replaced_and_deleted(client, robot, passing: Passing) -> None:
     stream = Stream(client, 6004, {"type": 5})
     await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)

@@ -20,6 +20,8 @@ from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorN
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
 from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, encode_stcm
+from tests.protocols.slamware.drawings import DESK, ICE, ok
+from tests.protocols.slamware.drawings import WALL as WIRE_WALL
 
 SLAM, MULTI = "/api/core/slam/v1", "/api/multi-floor/map/v1/stcm"
 WALL = Line(1, LineKind.WALL, Point(1.0, 1.0), Point(2.0, 1.0))
@@ -50,6 +52,25 @@ async def test_full_disk_leaves_grid_and_drawings(
     world.faults.clear(fault.number)
     assert (await client.put(f"{SLAM}/maps/origin", json={"new_origin": {"x": 1.0, "y": 0.0}})).status_code == 200
     assert robot[MapAnnotations].current.lines[0].start.x == pytest.approx(0.0)
+
+
+@pytest.mark.world("empty")
+async def test_full_disk_lets_drawings_be_deleted(world: World, robot: Robot, client: httpx.AsyncClient) -> None:
+    artifact = "/api/core/artifact/v1"
+    walls, areas, pois = (f"{artifact}/{name}" for name in ("lines/walls", "rectangle-areas/dangerous_area", "pois"))
+    for number in range(3):
+        await ok(await client.post(walls, json=[WIRE_WALL]))
+        await ok(await client.post(areas, json=ICE))
+        await ok(await client.post(pois, json=DESK | {"id": f"d{number}"}))
+    world.faults.inject("full_disk", "a")
+    for path in (walls, areas, pois):
+        first = (await client.get(path)).json()[0]["id"]
+        await ok(await client.delete(f"{path}/{first}"))
+        assert len((await client.get(path)).json()) == 2
+        await ok(await client.delete(path))
+        assert (await client.get(path)).json() == []
+    for path, body in ((walls, [WIRE_WALL]), (areas, ICE), (pois, DESK)):
+        assert (await client.post(path, json=body)).status_code == 403
 
 
 async def test_floor_with_too_many_lines_is_refused(bare: Robot, bare_client: httpx.AsyncClient) -> None:
