@@ -9,9 +9,10 @@ from typing import Any
 
 import pytest
 
-from roboglot.model.actions import ActionStatus
+from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.energy.power import Power, PowerMode
 from roboglot.model.components.logistics.jack import Jack
+from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.system.file_store import FileStore
@@ -246,6 +247,29 @@ async def test_hibernation_is_silent_until_it_ends(yard: Opened) -> None:
     assert "ignored" not in states(one)
     assert control.state["orderId"] == "one"
     assert one.robot[Power].mode is PowerMode.AWAKE
+
+
+async def test_refused_hibernation_keeps_the_order(yard: Opened, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A driven dog only saves power by itself, and a driven Slamware robot only sleeps."""
+    one = await yard()
+    control, power = one.control, one.robot[Power]
+
+    def refuse(_: Power, *, source: str = "") -> Action:
+        raise Refused(f"not for {source}")
+
+    monkeypatch.setattr(type(power), "save", refuse)
+    monkeypatch.setattr(Power, "rests", raising=False, value=())
+    control.send("order", order("one", [(0, 0), (1, 0)]))
+    await one.until(lambda: control.state["driving"])
+    control.send("instantActions", instant(action("startHibernation", "no")))
+    await one.until(lambda: states(one).get("no", ("", ""))[0] == "FAILED")
+    assert [node["nodeId"] for node in control.state["nodeStates"]] == ["n1"]
+    await one.until(lambda: not control.state["nodeStates"])
+    assert one.robot[Localization].pose.x == pytest.approx(1.0, abs=0.1)
+    monkeypatch.setattr(Power, "rests", raising=False, value=(PowerMode.ASLEEP,))
+    control.send("instantActions", instant(action("startHibernation", "sleep")))
+    await one.until(lambda: control.heard["connection"][-1]["connectionState"] == "HIBERNATING")
+    assert power.mode is PowerMode.ASLEEP
 
 
 @pytest.mark.slow  # in short: test_hibernation_is_silent_until_it_ends

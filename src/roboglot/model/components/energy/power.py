@@ -40,6 +40,11 @@ class Power(Component):
         """Current state."""
 
     @property
+    def rests(self) -> tuple[PowerMode, ...]:
+        """Modes that ``save`` and ``sleep`` can bring this robot to, the lighter one first."""
+        return (PowerMode.LOW_POWER, PowerMode.ASLEEP)
+
+    @property
     @abstractmethod
     def automatic(self) -> bool:
         """True if a robot that lies for half a minute goes to low power by itself."""

@@ -35,6 +35,10 @@ class CyberDogPower(Power):
         return MODES.get(beat.state, PowerMode.AWAKE) if beat else PowerMode.AWAKE
 
     @property
+    def rests(self) -> tuple[PowerMode, ...]:
+        return ()
+
+    @property
     def automatic(self) -> bool:
         return self._status.saves
 

@@ -45,6 +45,10 @@ class SlamwarePower(Power):
         return self._mode
 
     @property
+    def rests(self) -> tuple[PowerMode, ...]:
+        return (PowerMode.ASLEEP,)
+
+    @property
     def automatic(self) -> bool:
         return False
 
