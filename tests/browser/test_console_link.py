@@ -7,7 +7,11 @@ import asyncio
 import pytest
 
 from roboglot.console.live import Page as ServerPage
-from tests.browser.served import PATIENCE, OpenConsole, Page, Served, until
+from roboglot.model.components.logistics.delivery import Delivery, OrderKind, OrderRequest
+from roboglot.model.components.mapping.places import Places
+from roboglot.model.geometry import Pose
+from roboglot.model.maps import PointOfInterest
+from tests.browser.served import PATIENCE, OpenConsole, Page, Served, becomes, shows, until
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 QUICKLY = """() => {
@@ -22,6 +26,9 @@ OTHER_ROBOTS = """() => import('/link.js').then((link) => {
 })"""
 
 
+LIST = ".card:nth-child(3) li"
+ORDERS = f"""[...document.querySelectorAll('{LIST}')].map((order) =>
+    [...order.querySelectorAll('b, .badge')].map((part) => part.textContent).join(' '))"""
 # What the page sends, as values.
 NOTED = """() => {
     const { send } = WebSocket.prototype;
@@ -114,3 +121,24 @@ async def test_page_without_connection_says_so(served: Served, open_console: Ope
         await page.evaluate(f"location.hash = '#/{view}'")
         await page.wait_for_selector(f"{place} .warned >> text=Last known:")
         assert await page.locator(".allwell, .thumbnail").count() == 0
+
+
+async def test_orders_wait_after_a_stop(open_console: OpenConsole, served: Served) -> None:
+    """The page called a robot idle that carried out an order, and a stopped one drove on with the next."""
+    robot = served.robot
+    await robot[Places].put(PointOfInterest("r", Pose(2.0, 0.0), {"display_name": "room"}))
+    await robot[Delivery].accept(OrderRequest(OrderKind.FOOD, "room"), OrderRequest(OrderKind.GUIDE, "room"))
+    page = await open_console(language="zh")
+    await page.click("#tab-actions")
+    await shows(page, ORDERS, ["送餐到 room 执行中", "带人去 room 等待中"])
+    await page.click(".stop")
+    await becomes(lambda: asyncio.sleep(0, robot[Delivery].executing), wanted=False)
+    await page.reload()
+    await until(page, "document.querySelector('.banner')?.textContent.includes('订单在等待')")
+    await page.click("#tab-actions")
+    for left in (1, 0):
+        await page.locator(f"{LIST} button").first.click()
+        await shows(page, f"document.querySelectorAll('{LIST} button').length", left)
+    await page.click(".banner button")
+    await until(page, "!document.querySelector('.banner')")
+    assert robot[Delivery].executing

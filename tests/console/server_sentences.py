@@ -87,6 +87,8 @@ def _said(tree: ast.Module, errors: set[str], outside: bool) -> Iterator[tuple[s
                 | ast.AugAssign(target=ast.Name(id=name))
             ) if name in NAMED:
                 values = [node.value]
+            case ast.ClassDef(name="Failure", body=body):  # of orders
+                values = [member.value for member in body if isinstance(member, ast.Assign)]
         for value in values:
             yield from ((text, line) for text in _texts(value))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from roboglot.console import plain_values
+from roboglot.console.verbs.orders import orders_of
 from roboglot.console.verbs.robots import VERBS
 from roboglot.model.components.energy.battery import Battery, DockContact
 from roboglot.model.components.energy.power import Power
@@ -61,6 +62,7 @@ def state_of(robot: Robot) -> dict[str, object]:
         ],  # verbs of missing parts
         "actions": [plain_values.action(action, robot.clock.time()) for action in robot.actions.running()],
         "history": [plain_values.action(action, robot.clock.time()) for action in reversed(robot.actions.history)],
+        "orders": orders_of(robot),
         "control": _control(robot),
         "faults": _faults(robot),
         "battery": _battery(robot),

@@ -16,6 +16,7 @@ import msgspec
 from roboglot.hosting.local_socket import LocalServer
 from roboglot.model.components.system.lease import PERSON, Lease
 from roboglot.model.components.system.link import Link
+from roboglot.model.components.system.stopping import stop
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
@@ -105,7 +106,7 @@ class LeaseServer(LocalServer):
                     raise LookupError(f"there is no door {door!r}{instead(door, self._doors)}")
                 await robot[Lease].take(request.who)
             case "stop":
-                await robot.actions.cancel(reason="stopped by the owner of this machine")
+                await stop(robot, reason="stopped by the owner of this machine")
             case "reset":
                 if self._stage is None or robot.id not in {placed.name for placed in self._stage.robots}:
                     raise LookupError(f"robot {robot.id} is in no simulated world")

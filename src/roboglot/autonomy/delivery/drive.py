@@ -8,6 +8,7 @@ from collections.abc import Callable
 from roboglot.autonomy.delivery.rules import place_named
 from roboglot.autonomy.navigation.context import SPEED_MAX
 from roboglot.model.actions import Action, ActionStatus
+from roboglot.model.client_context import client
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.logistics.delivery import Failure, Policy
 from roboglot.model.components.mapping.annotations import LineKind, MapAnnotations
@@ -20,6 +21,7 @@ from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions, Tracks
+from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import Blocked, EmergencyStopped, Expired, NotFound, NotLocalized, RobotError, Unreachable
 from roboglot.model.events import DeliveryNews, DeliveryReported
 from roboglot.model.geometry import Point
@@ -174,7 +176,7 @@ class DeliveryDrive:
 
     async def _wait_until_free(self, patience: float) -> None:
         """Wait for the end of holds, emergency stops and other clients' drives. Raises Failed after ``patience``."""
-        while not self.allowed or self._stopped() or self._robot.actions.running(BASE):
+        while not self.allowed or self._stopped() or self._taken() or self._robot.actions.running(BASE):
             if not self.allowed:
                 began = self._robot.clock.time()
                 await self._allowed.wait()
@@ -183,6 +185,9 @@ class DeliveryDrive:
             if self._robot.clock.time() >= patience:
                 raise Failed(Failure.STOPPED if self._stopped() else Failure.INTERRUPTED)
             await self._robot.clock.sleep(LOOK)
+
+    def _taken(self) -> bool:
+        return Lease in self._robot and not self._robot[Lease].may_move(client())
 
     def _stopped(self) -> bool:
         if EmergencyStop not in self._robot:

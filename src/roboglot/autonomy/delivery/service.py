@@ -108,6 +108,12 @@ class QueueDelivery(Delivery):
         self._driver.hold(not on)
         self._courier.wake()
 
+    def halt(self) -> bool:
+        if not self.executing or not self._book.open:
+            return False
+        self._driver.hold(True)
+        return True
+
     async def start_pickup(self) -> None:
         order = self.current
         if order and order.stage is OrderStage.HANDING_OVER:

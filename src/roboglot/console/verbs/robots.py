@@ -22,8 +22,9 @@ from roboglot.model.components.motion.gimbal import Gimbal
 from roboglot.model.components.motion.gripper import Gripper
 from roboglot.model.components.motion.legs import Legs
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.components.system import stopping
 from roboglot.model.components.system.health import Health
-from roboglot.model.components.system.lease import Lease, moves
+from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import Point, Twist
 from roboglot.model.robot import Robot
@@ -90,12 +91,8 @@ async def undock(robot: Robot) -> Started:
 
 @VERBS.on("stop")
 async def stop(robot: Robot) -> None:
-    """Cancel everything that moves the robot, for any client; returns when it stands."""
-    doomed = [action for action in robot.actions.running() if moves(action)]
-    for action in doomed:
-        action.cancel("stopped at the console")
-    for action in doomed:
-        await action.done()
+    """Cancel everything that moves the robot, for any client, and hold its orders; returns when it stands."""
+    await stopping.stop(robot, reason="stopped at the console", moving=True)
 
 
 @VERBS.on("cancel")

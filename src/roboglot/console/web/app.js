@@ -83,6 +83,9 @@ function Banner() {
   const safety = state.value?.safety;
   if (safety?.emergency_stop) return html`<div class="banner bad" role="alert"><${Icon} name="alert" />${t("estop.on")}
     <${Button} label=${t("estop.release")} verb="emergency_stop" onClick=${() => settle(() => command("emergency_stop", { engage: false }))} /></div>`;
+  const held = state.value?.orders?.held;
+  if (held) return html`<div class="banner warn" role="status">${robotWord(held)}
+    <${Button} label=${t("resume")} verb="resume_orders" onClick=${() => settle(() => command("resume_orders"))} /></div>`;
   if (safety?.power && safety.power !== "awake") return html`<div class="banner warn" role="status">${t("power.is", { mode: robotWord(safety.power) })}</div>`;
   return null;
 }

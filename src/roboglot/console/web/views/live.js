@@ -119,11 +119,13 @@ function Actions() {
   return html`<div class="card"><h3>${t("actions.now")}</h3>
       ${actions.length ? html`<ul class="actions">${actions.map((a) => html`<${Running} key=${a.id} action=${a} />`)}</ul>` : html`<p class="muted">${t("actions.none")}</p>`}
       ${refused && html`<p class="warned">${t("actions.refused", { who: refused.client, doing: robotWord(refused.doing), why: refused.reason })}</p>`}</div>
+    ${state.value.orders?.list.length ? html`<${Orders} />` : null}
     <div class="card"><h3>${t("actions.before")}</h3>
       ${history.length ? html`<ol class="actions">${history.map((a) => html`<li key=${a.id}><b>${robotWord(a.name)}</b><span class=${`badge ${a.status.toLowerCase()}`}>${robotWord(a.status)}</span>
         <small>${a.client || t("itself")} · ${duration(a.seconds)}</small>${a.reason && html`<em>${robotWord(a.reason)}</em>`}</li>`)}</ol>` : html`<p class="muted">${t("actions.nothing")}</p>`}</div><${Recording} />`;
 }
 
+const Orders = later(() => import("./orders.js").then((m) => m.Orders));
 const plots = () => import("./plots.js").then((m) => m.Plots);
 const note = () => { setTimeout(() => plots().catch(note), 2000); }; // from then on; without a server later
 note();

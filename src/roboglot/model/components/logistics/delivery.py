@@ -247,6 +247,10 @@ class Delivery(Component):
         """Hold the robot (a person is at its screen), or continue; without orders it then goes to rest."""
 
     @abstractmethod
+    def halt(self) -> bool:
+        """Hold a robot that has orders, at once; return True if it was not held. ``execute`` stores the hold."""
+
+    @abstractmethod
     async def start_pickup(self) -> None:
         """Report that a person begins to take goods. Raises Refused unless the robot stands at the target."""
 
