@@ -14,7 +14,7 @@ from roboglot.model.components.logistics.delivery import Failure, Policy
 from roboglot.model.components.mapping.annotations import LineKind, MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_memory import settle
-from roboglot.model.components.mapping.storeys import StoreyPlace, Storeys
+from roboglot.model.components.mapping.storeys import StoreyMaps, StoreyPlace, Storeys
 from roboglot.model.components.mapping.track_graph import through_tracks
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.docking import Docking
@@ -88,8 +88,7 @@ class DeliveryDrive:
     async def go(self, known: StoreyPlace, policy: Policy, speed: float | None) -> None:
         """Drive to a place, by lift if needed, no faster than ``speed`` (m/s). Raises Failed."""
         await self._leave_dock(policy)
-        if known.floor:
-            await self._ride(known.floor, policy)
+        await self._ride(known.floor, policy)
         place = known.place
         ratio = policy.speed_ratio
         if speed is not None:
@@ -119,17 +118,25 @@ class DeliveryDrive:
 
     async def go_home(self, policy: Policy) -> None:
         """Drive onto the dock, by lift if needed. Raises Failed."""
-        if Storeys in self._robot and (maps := self._robot[Storeys].maps) is not None:
+        if (maps := self._storeys) is not None:
             await self._ride(maps.home(), policy)
         await self._drive(lambda: self._robot[Docking].dock(source=SOURCE), policy)
 
+    @property
+    def _storeys(self) -> StoreyMaps | None:
+        return self._robot[Storeys].maps if Storeys in self._robot else None
+
     async def _ride(self, floor: str, policy: Policy) -> None:
-        maps = self._robot[Storeys].maps
+        """Ride to ``floor`` (empty: this one), unless there and in no car. Raises Failed."""
+        maps = self._storeys
         if maps is None:
-            raise Failed(Failure.NO_PLACE)  # the component that knew the floor is gone
+            if floor:
+                raise Failed(Failure.NO_PLACE)  # the component that knew the floor is gone
+            return
         await settle(self._robot)
-        if maps.current != floor:
-            await self._drive(lambda: maps.go_to(floor, SOURCE), policy)
+        goal = floor or maps.current
+        if maps.current != goal or maps.in_car:
+            await self._drive(lambda: maps.go_to(goal, SOURCE), policy)
 
     async def _leave_dock(self, policy: Policy) -> None:
         robot, clock = self._robot, self._robot.clock

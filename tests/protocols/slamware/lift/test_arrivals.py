@@ -54,4 +54,4 @@ async def test_questions_on_arrival_wait_for_new_floor(
     await forward(seconds=1)
     assert known(last_place(robot)).floor == here["map_id"]  # for its next start
     assert robot[Floors].current == 1
-    assert (await client.get(f"{ACTIONS}/:current")).json()["stage"] == "GOING_TO_TARGET"  # without a ride
+    assert (await client.get(f"{ACTIONS}/:current")).json()["stage"] == "IN_ELEVATOR"  # and out of it, here

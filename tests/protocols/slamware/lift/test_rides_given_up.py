@@ -10,11 +10,21 @@ import httpx
 import pytest
 
 from roboglot.model.components.logistics.lift_client import LiftClient
+from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
-from tests.protocols.slamware.lift.two_floors import ACTIONS, MAPS, MULTI, map_two_floors, on_map, start
+from tests.protocols.slamware.lift.two_floors import (
+    ACTIONS,
+    MAPS,
+    MULTI,
+    SUCCESS,
+    finish,
+    map_two_floors,
+    on_map,
+    start,
+)
 from tests.protocols.witness import Witness
 
 
@@ -91,3 +101,34 @@ async def test_rides_given_up_at_any_moment(
         await client.delete(f"{ACTIONS}/:current")
         await witness.sees_it_rest(10.0)
         await walk.check()
+
+
+@pytest.mark.slow  # in short: test_ride_given_up_in_the_car
+@pytest.mark.parametrize("how", ["action", "order"])
+async def test_car_of_given_up_ride_is_left(
+    how: str, robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
+) -> None:
+    origin = await map_two_floors(robot, client, world, forward)
+    ride = await start(client, "MultiFloorMoveAction", target={"poi_name": "upstairs"})
+    while world.truth.pose_of("a").distance_to(Point(0.95, 10.0)) > 0.1:
+        await forward(seconds=0.5)
+    await forward(seconds=2)
+    await client.delete(f"{ACTIONS}/:current")
+    await finish(client, forward, ride)
+    await forward(seconds=30)
+    assert (world.truth.floor_of("a"), robot[LiftClient].state.target) == (1, None)
+    if how == "action":
+        again = await start(client, "MultiFloorMoveAction", target={"poi_name": "upstairs"})
+        assert (await finish(client, forward, again))[0] == SUCCESS
+    else:
+        tasks, order = "/api/delivery/v1/tasks", {"location": {"poi_name": "upstairs", "task_points": []}}
+        assert (await client.post(tasks, json=order | {"type": "RETURN"})).json()["result"] is True
+        status = ""
+        while status not in ("SUCCEEDED", "FAILED"):
+            await forward(seconds=1)
+            (task,) = (await client.get(tasks, params={"status": "all"})).json()
+            status = task["status"]
+        assert status == "SUCCEEDED", task
+    assert world.truth.floor_of("a") == 1
+    assert world.truth.pose_of("a").point.distance_to(Point(6.0, 10.0)) < 0.3
+    assert robot[Localization].pose.distance_to(on_map(Point(6.0, 10.0), origin)) < 0.3

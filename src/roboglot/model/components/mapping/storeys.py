@@ -25,6 +25,10 @@ class StoreyMaps(Protocol):
     def current(self) -> str:
         """Floor of the robot."""
 
+    @property
+    def in_car(self) -> bool:
+        """True if the robot is in a lift's car; ``go_to`` brings it out, also on the floor where it is."""
+
     def places(self) -> list[StoreyPlace]:
         """Return the places of all other floors, in the order of the floors."""
 

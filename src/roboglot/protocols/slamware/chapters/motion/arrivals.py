@@ -18,7 +18,7 @@ from roboglot.model.events import FloorReached, PoseConfirmed
 from roboglot.model.geometry import Pose
 from roboglot.protocols.slamware.chapters.artifact.drawing import seen_from
 from roboglot.protocols.slamware.chapters.motion.lift_rides import shared_elevators, stop_at
-from roboglot.protocols.slamware.chapters.multi_floor.elevators import Elevator, elevators_here
+from roboglot.protocols.slamware.chapters.multi_floor.elevators import car_around, elevators_here
 from roboglot.protocols.slamware.context import Context
 
 log = logging.getLogger(__name__)
@@ -53,23 +53,17 @@ class Arrivals:
         The car may have gone on while the robot was off, and floors look alike from there.
         """
         self._end_look()
-        if Floors in self._context.robot and self._car() is not None:
+        if Floors in self._context.robot and car_around(self._context.robot) is not None:
             self._end_look = self._context.robot.events.listen(PoseConfirmed, lambda _: self._look())
 
     def _look(self) -> None:
         self._end_look()
-        robot, car = self._context.robot, self._car()
+        robot, car = self._context.robot, car_around(self._context.robot)
         with contextlib.suppress(RobotError):  # the lift is out of reach, or does not stop here
             state = robot[LiftClient].state
             if car and state.target is None and state.floor != stop_at(self._context, self._context.maps.current):
                 place = robot[Localization].pose.relative_to(car.inside)
                 self._reached(FloorReached(stamp=robot.clock.time(), floor=state.floor, place=place))
-
-    def _car(self) -> Elevator | None:
-        """Return the elevator that the robot is in."""
-        robot = self._context.robot
-        here = robot[Localization].pose
-        return next((elevator for elevator in elevators_here(robot) if elevator.area.contains(here)), None)
 
     def _declare(self) -> None:
         """Tell the lift's rides on which floor the robot is."""

@@ -24,6 +24,7 @@ from roboglot.protocols.slamware.chapters.motion.homing import head_home
 from roboglot.protocols.slamware.chapters.motion.moves import navigate, navigation_options
 from roboglot.protocols.slamware.chapters.multi_floor.elevators import (
     Elevator,
+    car_around,
     elevator_called,
     elevators_here,
     elevators_of,
@@ -62,8 +63,7 @@ def multi_floor_move(context: Context, options: MultiFloorMoveOptions) -> Action
         if pose is None and target.pose is not None:
             floor, pose = _floor(context, target.building, target.floor), pose_of(target.pose)
         assert pose is not None
-        if floor is not None:
-            await change_floor(context, errand, floor)
+        await change_floor(context, errand, floor)
         yaw = pose.yaw if how.has("with_yaw") and how.yaw is None else None
         await errand.do(navigate(errand.robot, [pose.point], how, source=PART, yaw=yaw))
 
@@ -78,8 +78,7 @@ def multi_floor_back_home(context: Context, options: GoHomeOptions) -> Action:
 
     async def work(errand: Errand) -> None:
         await settle(context.robot)
-        if (found := home_floor(context)) is not None:
-            await change_floor(context, errand, found)
+        await change_floor(context, errand, home_floor(context))
         await head_home(errand, wanted)
 
     return run_errand(context.robot, "go home over floors", work)
@@ -114,25 +113,41 @@ def _floor(context: Context, building: str, floor: str) -> FloorMap | None:
     raise NotFound(f"no floor {floor} is loaded")
 
 
-async def change_floor(context: Context, errand: Errand, floor: FloorMap) -> None:
-    """Take the lift to a floor, unless on it already, and switch to its map."""
+async def change_floor(context: Context, errand: Errand, floor: FloorMap | None) -> None:
+    """Take the lift to a floor, and switch to its map; on it already, or for None, only get out of a car.
+
+    Out of a car, as after a ride that was given up there, the robot drives straight through the door, held open.
+    """
     await settle(context.robot)
-    if floor.name == context.maps.current:
-        return
     robot, maps = context.robot, context.maps
-    shared = shared_elevators(robot, floor)
-    if not shared or Floors not in robot:
-        raise Unreachable(f"no elevator leads from {maps.current.floor} to {floor.name.floor}")
-    lift, landing = shared[0]
-    floors, goal = robot[Floors], stop_at(context, floor.name)
+    name = maps.current if floor is None else floor.name
+    if floor is None or name == maps.current:
+        car = car_to_leave(context)
+        if car is None:
+            return
+        lift = landing = car
+    else:
+        shared = shared_elevators(robot, floor)
+        if not shared or Floors not in robot:
+            raise Unreachable(f"no elevator leads from {maps.current.floor} to {name.floor}")
+        lift, landing = shared[0]
+    floors, goal = robot[Floors], stop_at(context, name)
     floors.begin_on(stop_at(context, maps.current))
     floors.set_lift(lift.waiting(), lift.inside)
     await errand.do(floors.ride(goal, redraw=False, source=PART))  # on arrival the floor is entered, drawings and all
-    if floor.name != maps.current:
-        await maps.enter(floor.name.building, floor.name.floor, landing.waiting())
+    if name != maps.current:
+        await maps.enter(name.building, name.floor, landing.waiting())
     elif robot[Localization].lost is not None:
         async with confirmed():
             robot[Localization].set_pose(landing.waiting())
+
+
+def car_to_leave(context: Context) -> Elevator | None:
+    """Return the elevator that the robot is in, if it can have its door held open here; None outside."""
+    robot, here = context.robot, context.maps.current
+    if Floors not in robot or (here.floor not in robot[LiftClient].floors and len(context.maps.floors) < 2):
+        return None
+    return car_around(robot)
 
 
 def shared_elevators(robot: Robot, floor: FloorMap) -> list[tuple[Elevator, Elevator]]:

@@ -124,9 +124,14 @@ def elevators_here(robot: Robot) -> list[Elevator]:
 
 def elevator_around(robot: Robot) -> str:
     """Return the id of the robot's elevator; empty outside. Raises ComponentMissing without Localization."""
-    here, radius = robot[Localization].pose, robot.description.radius
-    found = (e.id for e in elevators_here(robot) if e.relation(here, radius) is PoseRelation.IN)
-    return next(found, "")
+    car = car_around(robot)
+    return car.id if car is not None else ""
+
+
+def car_around(robot: Robot) -> Elevator | None:
+    """Return the elevator that the robot is in. Raises ComponentMissing without Localization."""
+    here = robot[Localization].pose
+    return next((elevator for elevator in elevators_here(robot) if elevator.area.contains(here)), None)
 
 
 def elevator_called(robot: Robot, id: str) -> Elevator:

@@ -6,7 +6,7 @@ from roboglot.model.actions import Action
 from roboglot.model.components.mapping.storeys import StoreyPlace
 from roboglot.model.errors import InvalidGoal
 from roboglot.protocols.slamware.chapters.motion.errands import Errand, run_errand
-from roboglot.protocols.slamware.chapters.motion.lift_rides import change_floor, home_floor
+from roboglot.protocols.slamware.chapters.motion.lift_rides import car_to_leave, change_floor, home_floor
 from roboglot.protocols.slamware.chapters.slam.composite import FloorName
 from roboglot.protocols.slamware.context import Context
 
@@ -32,10 +32,15 @@ class LoadedStoreys:
         found = home_floor(self._context)
         return _label(found.name) if found else self.current
 
+    @property
+    def in_car(self) -> bool:
+        """True if the robot is in a car whose door it can have opened."""
+        return car_to_leave(self._context) is not None
+
     def go_to(self, floor: str, source: str) -> Action:
-        """Drive to the floor by lift."""
+        """Drive to the floor by lift, or out of a car here."""
         found = next((known for known in self._context.maps.floors if _label(known.name) == floor), None)
-        if found is None:
+        if found is None and floor != self.current:
             raise InvalidGoal(f"no floor {floor} is loaded")
 
         async def work(errand: Errand) -> None:
