@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 from roboglot.console.studio.channel import Session
-from tests.browser.served import shows, until
+from tests.browser.served import Tabs, shows, until
 from tests.browser.test_console_link import QUICKLY
 from tests.browser.test_studio import COUNTING, FOREVER, READY, Open, Page, loaded, phase, prints, studio
 
@@ -21,6 +23,13 @@ async def opens_text(page: Page, text: str) -> None:
     given = {"kind": "text", "body": text}
     await page.evaluate("given => import('/studio/program.js').then(p => { p.show(given); p.changed(); })", given)
     await page.wait_for_selector(".cm-content")
+
+
+# What the pages keep in the browser.
+KEPT = (
+    "language", "theme", "person", "robot", "studio.recent", "studio.stars", "studio.look", "studio.class",
+    "studio.role", "studio.tab", "studio.unsent",
+)  # fmt: skip
 
 
 async def test_line_of_a_running_text_is_lit(studio: Open) -> None:
@@ -176,3 +185,30 @@ async def test_hint_makes_way_for_the_toolbox(studio: Open) -> None:
     assert await page.locator(".start p").is_visible()
     await page.click("#math")
     await page.wait_for_selector(".start p", state="hidden")
+
+
+@pytest.mark.parametrize("stored", ["fr", "{", "null", "__proto__", "constructor"])
+async def test_pages_open_with_any_storage(tabs: Tabs, stored: str) -> None:
+    """Another program of this address may have kept other things: pages were blank, or showed keys for words."""
+    storage = dict.fromkeys((*KEPT, "studio.program.p", "studio.versions.p"), stored) | {"studio.last": "p"}
+    for path, shown in (("/#/toString", "nav"), ("/studio/", "header")):
+        page = await tabs.open(path, storage, {"width": 1280, "height": 800})
+        await page.wait_for_selector(f"{shown} >> text=/(Class|Stop)/")
+        if path == "/studio/":
+            await until(page, READY)
+            await page.click("#tab-missions")
+        assert page.errors == []
+
+
+async def test_unreadable_blocks_stay_in_the_browser(tabs: Tabs) -> None:
+    """The page opened empty without a word; the next change stored that in place of the program."""
+    blocks = {"languageVersion": 0, "blocks": [{"type": "of_a_newer_version", "x": 1, "y": 1}]}
+    kept = json.dumps({"id": "p", "kind": "blocks", "name": "n", "style": {"blocks": blocks}, "body": "print(1)"})
+    storage = {"language": "en", "studio.last": "p", "studio.program.p": kept}
+    page = await tabs.open("/studio/", storage, {"width": 1280, "height": 800})
+    await until(page, READY)
+    await until(page, "document.querySelector('.notice').textContent.includes('cannot be read')")
+    opened = "import('/studio/program.js').then(p => { p.changed(); return [p.program.value.kind, p.python()]; })"
+    assert await page.evaluate(opened) == ["text", "print(1)"]
+    assert await page.evaluate("localStorage.getItem('studio.program.p')") == kept
+    assert page.errors == []

@@ -103,6 +103,20 @@ async def test_old_class_admits_no_one(tmp_path: Path, monkeypatch: pytest.Monke
         assert (status, answer["error"]) == (401, "this class is over, unless its teacher comes back")
 
 
+async def test_joined_emoji_and_marks_of_direction_sign_in(tmp_path: Path) -> None:
+    """A family of three was refused as if it were too long, and the studio asked for a name that was given."""
+    asking = AccessConfig(on=True, local=True)
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as served, paged(served, "") as teacher:
+        code = await opened(teacher)
+        status, taken, _ = await signed(served, name="\U0001f469\u200d\U0001f3eb Ms\u200f", code=code)
+        assert (status, taken["robot"]) == (200, "a")
+        async with paged(served, "") as page:
+            await asked(page, do="join", code=code, name="\u200fSara\u200d")
+            assert (await page.kind("joined"))["name"] == "Sara"
+            await asked(page, do="join", code=code, name="two\nlines")
+            assert "no line breaks" in (await page.kind("refused"))["why"]
+
+
 async def test_rights_that_are_gained_reach_open_pages(tmp_path: Path) -> None:
     (tmp_path / "w").mkdir()
     store = open_store(tmp_path / "w")

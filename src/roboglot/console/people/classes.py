@@ -101,7 +101,7 @@ class Classes:
 
         Raises Problem.
         """
-        name = name.strip()
+        name = class_requests.plain_name(name)
         class_ = self._current
         if class_ is None or not secrets.compare_digest(code.strip().upper().encode(), class_.code.encode()):
             class_ = None

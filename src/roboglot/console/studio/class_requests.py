@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import unicodedata
 from typing import Annotated, Literal
 
 import msgspec
 
 NAME_MAX, WORDS_MAX, STYLE_MAX = 40, 300, 400_000  # characters
 Words = Annotated[str, msgspec.Meta(max_length=WORDS_MAX)]
+
+
+def plain_name(name: str) -> str:
+    """Return a name without blanks around it and without format characters: joiners of emoji, marks of direction."""
+    return "".join(letter for letter in name if unicodedata.category(letter) != "Cf").strip()
 
 
 class PupilState(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

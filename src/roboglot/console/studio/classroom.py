@@ -16,7 +16,7 @@ from typing import Protocol
 import msgspec
 
 from roboglot.console.studio.class_files import ClassFiles, PupilWork
-from roboglot.console.studio.class_requests import Member, PupilState
+from roboglot.console.studio.class_requests import Member, PupilState, plain_name
 from roboglot.hosting.steady_time import SteadyTime
 from roboglot.model.errors import NotFound, Refused
 from roboglot.values import dataclass
@@ -312,9 +312,11 @@ class Seat:
         await self._room.save(opened)
 
     async def _join(self, request: Member) -> None:
-        name, joined = request.name.strip(), self._room.find(request.code)
-        if not name or not name.isprintable():
+        name, joined = plain_name(request.name), self._room.find(request.code)
+        if not name:
             raise Refused("give a name")
+        if not name.isprintable():
+            raise Refused("a name has letters, and no line breaks or invisible characters")
         self.leave()
         pupil = joined.enrol(name)
         if pupil.seat is not None:

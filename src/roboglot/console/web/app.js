@@ -15,7 +15,7 @@ const Recordings = later(() => import("./views/recordings.js").then((m) => m.Rec
 const Class = later(() => import("./views/class.js").then((m) => m.Class));
 
 const VIEWS = { live: ["map", Live], wire: ["wire", Wire], world: ["world", World], robots: ["robots", Robots], recordings: ["dot", Recordings], class: ["school", Class] };
-const named = () => (location.hash.slice(2) in VIEWS ? location.hash.slice(2) : "live");
+const named = () => (Object.hasOwn(VIEWS, location.hash.slice(2)) ? location.hash.slice(2) : "live");
 const view = signal(named());
 addEventListener("hashchange", () => { view.value = named(); });
 

@@ -5,20 +5,21 @@ import { signal, effect } from "@preact/signals";
 
 export const html = htm.bind(h);
 
-/** Keep a choice in the browser; without storage it lasts as long as the page.
- * @param {string} key @param {string} fallback */
-export function kept(key, fallback) {
+/** Keep a choice in the browser; without storage it lasts as long as the page. What does not fit is not ours.
+ * @param {string} key @param {string} fallback @param {RegExp} [fits] */
+export function kept(key, fallback, fits = /^/) {
   let start = fallback;
   try { start = localStorage.getItem(key) ?? fallback; } catch { /* no storage here */ }
+  if (!fits.test(start)) start = fallback;
   const choice = signal(start);
   effect(() => { const now = choice.value; try { localStorage.setItem(key, now); } catch { /* as above */ } });
   return choice;
 }
 
 const PREFERRED = (navigator.languages ?? [navigator.language]).some((l) => /^zh/i.test(l)) ? "zh" : "en";
-export const language = kept("language", PREFERRED);
-export const theme = kept("theme", matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark");
-export const person = kept("person", `guest-${Math.random().toString(36).slice(2, 6)}`);
+export const language = kept("language", PREFERRED, /^(en|zh)$/);
+export const theme = kept("theme", matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark", /^(light|dark)$/);
+export const person = kept("person", `guest-${Math.random().toString(36).slice(2, 6)}`, /^.{1,40}$/);
 
 /** The studio of the world that a pupil is sent to, in the same language. @param {{page?: string, elsewhere?: string, code: string, name: string}} given */
 export function elsewhere(given) {

@@ -13,7 +13,7 @@ const EVERY = 700, SLOWLY = 3000, AGAIN = 2000; // ms between two reports of a p
 const code = kept("studio.class", ""), role = kept("studio.role", "");
 export const group = signal(/** @type {any} */ (null)); // joined, as a pupil
 export const grid = signal(/** @type {any} */ (null)); // of a teacher
-const maps = signal(/** @type {Record<string, string>} */ ({})); // of pupils, by their names
+const maps = signal(/** @type {Record<string, string>} */ ({ __proto__: null })); // of pupils, by their names
 
 const stars = () => Object.values(results()).reduce((sum, n) => sum + n, 0);
 const doing = () => ({ phase: phase.value, lit: litWords(), program: program.value.name.slice(0, 100), error: wrong(), mission: program.value.lesson ?? "", stars: stars() });
@@ -50,7 +50,7 @@ listen((message) => {
     case "elsewhere": code.value = ""; role.value = ""; location.assign(elsewhere(message)); break;
     case "ended": group.value = null; grid.value = null; code.value = ""; role.value = ""; say(t("studio.class.over")); break;
     case "left": group.value = null; grid.value = null; setTimeout(back, AGAIN); break;
-    case "map": maps.value = { ...maps.value, [message.name]: message.png }; break;
+    case "map": maps.value = { __proto__: null, ...maps.value, [message.name]: message.png }; break;
     case "grid": grid.value = message; code.value = message.code; role.value = "teacher"; break;
     case "stopped": say(t("stopped.all", { n: message.robots })); break;
     case "handed": say(t("studio.handed")); break;

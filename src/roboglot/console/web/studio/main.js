@@ -26,7 +26,7 @@ Object.assign(PATHS, { // the studio's own icons
   star: "M12 3l2.8 5.8 6.2.9-4.5 4.4 1 6.2-5.5-3-5.5 3 1-6.2L3 9.7l6.2-.9z",
 });
 const TABS = { python: Python, output: Output, values: Values, robot: RobotPanel, missions: Missions, group: Group };
-export const tab = kept("studio.tab", "python");
+export const tab = kept("studio.tab", "python", new RegExp(`^(${Object.keys(TABS).join("|")})$`));
 const whole = signal(matchMedia("(min-width: 900px)").matches ? "both" : "blocks"); // on a phone one at a time
 const sought = signal(""), hits = signal(0);
 

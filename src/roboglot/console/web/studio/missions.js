@@ -17,9 +17,10 @@ const litThere = signal("");
 const hints = signal(0);
 const stars = kept("studio.stars", "{}");
 const said = (/** @type {any} */ w) => w[language.value] ?? w.en;
-const earned = (id) => JSON.parse(stars.value)[id] ?? 0;
+const earned = (id) => results()[id] ?? 0;
 export const mission = () => missions.value.find((m) => m.id === program.value.lesson);
-export const results = () => JSON.parse(stars.value);
+/** @returns {Record<string, number>} */
+export const results = () => { try { return { ...JSON.parse(stars.value) }; } catch { return {}; } };
 
 export async function loadMissions() { missions.value = await (await fetch("/api/lessons")).json(); allowHere(); }
 export function allowHere() { const m = mission(); editor.allow(m?.allowed.length ? m.allowed : null); }

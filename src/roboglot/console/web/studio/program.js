@@ -19,7 +19,7 @@ const UNSENT = "studio.unsent"; // ids of programs that the robot does not have 
 
 function newIdSafe() { return Math.random().toString(36).slice(2, 12); }
 function pick({ id, name, kind, lesson, module }) { return { id, name, kind, lesson, module }; }
-function read(id) { try { return JSON.parse(localStorage.getItem(PREFIX + id) ?? "null"); } catch { return null; } }
+function read(id) { try { const found = JSON.parse(localStorage.getItem(PREFIX + id) ?? "null"); return found?.id === id ? found : null; } catch { return null; } }
 
 /** The Python of the program, whatever it is made of. */
 export const python = () => (program.value.kind === "blocks" ? editor.code.value : body.value);
@@ -34,7 +34,14 @@ export function whole() {
 export function restore() {
   const found = read(program.value.id);
   if (!found) return;
-  if (found.kind === "text") body.value = found.body; else if (found.style) editor.load(found.style);
+  if (found.kind === "text") body.value = String(found.body ?? "");
+  else if (found.style) {
+    try { editor.load(found.style); } catch (error) { // the blocks stay in the browser as they are
+      program.value = { ...program.value, id: `s${newIdSafe()}` };
+      asText(String(found.body ?? ""));
+      say(t("studio.open.text", { why: error.message }), true);
+    }
+  }
 }
 
 addEventListener("storage", ({ key, newValue }) => { // another tab of this browser changed it
@@ -86,7 +93,7 @@ export function back(version) {
   changed();
 }
 
-export function versions() { try { return JSON.parse(localStorage.getItem(`studio.versions.${program.value.id}`) ?? "[]"); } catch { return []; } }
+export function versions() { try { return [...JSON.parse(localStorage.getItem(`studio.versions.${program.value.id}`) ?? "[]")]; } catch { return []; } }
 
 /** The name of a program that was given none: of several on a robot the later ones have a number. @param {string} id */
 export function unnamed(id) {

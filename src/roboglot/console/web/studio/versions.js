@@ -28,12 +28,15 @@ function Changes({ body }) {
   return html`<ol class="printed changes" role="status" aria-label=${t("studio.versions.compare")}>${found.map(({ sign, text }) => html`<li class=${sign === "+" ? "came" : "went"}>${sign} ${text}</li>`)}</ol>`;
 }
 
+/** @param {{saved: number}} version */
+const when = ({ saved }) => new Date(saved).toLocaleString(document.documentElement.lang);
+
 /** @param {{done: () => void}} props */
 export function Versions({ done }) {
   const old = versions();
   if (!old.length) return null;
-  return html`<h3>${t("studio.versions")}</h3><ul class="rows">${old.map((/** @type {any} */ v) => html`<li key=${v.saved}><span class="grow"><b>${new Date(v.saved).toLocaleString(document.documentElement.lang)}</b><small>${v.name || t("studio.untitled")} · ${t("studio.versions.lines", { n: linesOf(v.body).length })}</small></span>
-      <${Button} label=${t("studio.versions.compare")} on=${compared.value === v.saved} onClick=${() => { compared.value = compared.value === v.saved ? 0 : v.saved; }} />
-      <${Button} label=${t("studio.open")} onClick=${() => { back(v); done(); }} />
+  return html`<h3>${t("studio.versions")}</h3><ul class="rows">${old.map((/** @type {any} */ v) => html`<li key=${v.saved}><span class="grow"><b>${when(v)}</b><small>${v.name || t("studio.untitled")} · ${t("studio.versions.lines", { n: linesOf(v.body).length })}</small></span>
+      <${Button} label=${t("studio.versions.compare")} of=${when(v)} on=${compared.value === v.saved} onClick=${() => { compared.value = compared.value === v.saved ? 0 : v.saved; }} />
+      <${Button} label=${t("studio.open")} of=${when(v)} onClick=${() => { back(v); done(); }} />
       ${compared.value === v.saved && html`<${Changes} body=${v.body} />`}</li>`)}</ul>`;
 }

@@ -24,10 +24,10 @@ function Pupil({ pupil }) {
   const state = states.value[pupil.robot], task = state?.actions.at(-1), own = { pupil: pupil.identity };
   return html`<li class=${`tile ${pupil.here ? "" : "warning"}`}><h2>${pupil.name}<small>${t("robot.named", { name: pupil.robot })} · ${t(pupil.here ? "class.here" : "class.away")}</small></h2>
     <p>${pupil.locked ? t("class.locked") : task ? robotWord(task.name) : t("task.none")}${state?.battery ? ` · ${Math.round(state.battery.charge * 100)} %` : ""}</p>
-    <div class="buttons"><${Button} kind="main" label=${t("show")} onClick=${() => { choose(pupil.robot); location.hash = "#/live"; }} />
-      <${Button} label=${t(pupil.locked ? "class.unlock" : "class.lock")} on=${pupil.locked} onClick=${() => ask({ do: pupil.locked ? "unlock" : "lock", ...own })} />
-      <${Button} label=${t("class.reset")} onClick=${() => ask({ do: "reset", ...own })} />
-      <${Button} label=${t("class.back")} onClick=${() => ask({ do: "give_back", ...own })} /></div></li>`;
+    <div class="buttons"><${Button} kind="main" label=${t("show")} of=${pupil.name} onClick=${() => { choose(pupil.robot); location.hash = "#/live"; }} />
+      <${Button} label=${t(pupil.locked ? "class.unlock" : "class.lock")} of=${pupil.name} on=${pupil.locked} onClick=${() => ask({ do: pupil.locked ? "unlock" : "lock", ...own })} />
+      <${Button} label=${t("class.reset")} of=${pupil.name} onClick=${() => ask({ do: "reset", ...own })} />
+      <${Button} label=${t("class.back")} of=${pupil.name} onClick=${() => ask({ do: "give_back", ...own })} /></div></li>`;
 }
 
 export function Class() {

@@ -80,8 +80,8 @@ function Figures() {
   const chosen = chosenPerson();
   return html`<div class="card"><h3>${t("people")}</h3>${names.length ? html`<ul class="list">${names.map((name) => html`<li>
       <${Button} label=${name} on=${chosen === name} onClick=${() => { someone.value = name; tool.value = "person"; }} />${chosen === name && html`
-      <${Button} label=${t("people.resume")} verb="resume_person" onClick=${() => changeWorld("resume_person", { person: name })} />
-      <${Button} label=${t("say")} verb="person_says" onClick=${() => { const text = prompt(t("say.text")); if (text) changeWorld("person_says", { person: name, text }); }} />
+      <${Button} label=${t("people.resume")} of=${name} verb="resume_person" onClick=${() => changeWorld("resume_person", { person: name })} />
+      <${Button} label=${t("say")} of=${name} verb="person_says" onClick=${() => { const text = prompt(t("say.text")); if (text) changeWorld("person_says", { person: name, text }); }} />
       <${Button} label=${t("remove")} of=${name} verb="remove_person" onClick=${() => changeWorld("remove_person", { person: name })} />`}</li>`)}</ul>` : html`<p class="muted">${t("people.none")}</p>`}</div>
     <div class="card"><h3>${t("boxes")}</h3>${boxes.length ? html`<ul class="list">${boxes.map((number) => html`<li><span>${t("box.number", { number })}</span>
       <${Button} label=${t("remove")} of=${t("box.number", { number })} verb="remove_box" onClick=${() => changeWorld("remove_box", { number: Number(number) })} /></li>`)}</ul>` : html`<p class="muted">${t("boxes.none")}</p>`}</div>
@@ -109,7 +109,7 @@ function Faults() {
       <label class="field"><span>${t("fault.seconds")}</span><input name="duration" type="number" min="0" step="1" placeholder=${t("fault.forever")} /></label>
       <${Button} type="submit" kind="main" label=${t("fault.inject")} verb="inject_fault" /></form>
     <div class="card"><h3>${t("fault.active")}</h3>${active.length ? html`<ul class="list">${active.map((f) => html`<li><span>${robotWord(f.kind)}<small>${f.robot ?? t("building")}</small></span>
-      <${Button} label=${t("fault.clear")} verb="clear_fault" onClick=${() => changeWorld("clear_fault", { number: f.number })} /></li>`)}</ul>` : html`<p class="muted">${t("fault.none")}</p>`}</div>`;
+      <${Button} label=${t("fault.clear")} of=${`${robotWord(f.kind)}, ${f.robot ?? t("building")}`} verb="clear_fault" onClick=${() => changeWorld("clear_fault", { number: f.number })} /></li>`)}</ul>` : html`<p class="muted">${t("fault.none")}</p>`}</div>`;
 }
 
 function Drawn() {
