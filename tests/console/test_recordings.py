@@ -202,6 +202,11 @@ async def test_two_recordings_are_compared_on_a_page(served: ServedConsole) -> N
     page = (await served.read(f"/api/recordings/{one}/compared/{other}/a")).decode()
     assert "ground truth: at most 0.00 m apart" in page
     assert await served.read(f"/api/recordings/{one}/compared/{other}/a") == page.encode()
+    folder = served.runtime.config.data / "recordings"
+    whole = (folder / other).read_bytes()
+    summary = int.from_bytes(whole[-28:-20], "little")  # behind the record that ends the data, of 13 bytes
+    (folder / "cut.mcap").write_bytes(whole[: summary - 13])
+    assert "cut.mcap is cut off: " in (await served.read(f"/api/recordings/{one}/compared/cut.mcap/a")).decode()
     status, words = await served.ask(f"/api/recordings/{one}/compared/{other}/z")
     assert (status, words["error"]) == (409, f"{one} has nothing of that robot and protocol")
 

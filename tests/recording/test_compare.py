@@ -197,5 +197,13 @@ def test_comparing_nothing_does_not_pass(row: list[Row]) -> None:
     assert "Nothing was compared" in reports.page(nothing, ("one", "other"))
 
 
+def test_reports_say_what_could_not_be_read() -> None:
+    found = compare(session(), session())
+    found.robot, found.notes = "a", ["<x> is cut off"]
+    page = reports.page(found, ("one", "other"))
+    assert "<p class=bad>&lt;x&gt; is cut off</p>" in page
+    assert "<p>robot a</p>" in page
+
+
 def test_equal_sessions_pass() -> None:
     assert compare(session(), session()).passes(100.0)

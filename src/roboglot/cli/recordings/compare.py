@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import sys
 from collections.abc import Collection, Sequence
 from enum import StrEnum
@@ -25,6 +26,19 @@ class Basis(StrEnum):
 
     VALUES = "values"
     BEHAVIOUR = "behaviour"
+
+
+class Warnings(logging.Handler):
+    """Warnings of readers: a report without them would take a recording that was cut off for a short one."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.lines: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep a warning."""
+        if (line := record.getMessage()) not in self.lines:
+            self.lines.append(line)
 
 
 def command(
@@ -57,9 +71,12 @@ def command(
     from roboglot.recording.comparing import reports
     from roboglot.recording.comparing.masks import STRICT, Mask, read_mask
 
+    warnings = Warnings()
+    logging.getLogger("roboglot.recording").addHandler(warnings)
     try:
         used = STRICT if strict else read_mask(mask) if mask else Mask()
         comparison = asyncio.run(compared((one, other), by, robot, door, used, commands=commands))
+        comparison.robot, comparison.notes = robot, warnings.lines
         if html:
             html.write_text(reports.page(comparison, (one, other)), encoding="utf-8")
         if junit:
@@ -67,6 +84,8 @@ def command(
     except (OSError, ValueError, ClientError) as error:
         print(f"roboglot compare: {in_words(error)}", file=sys.stderr)
         raise typer.Exit(2) from None
+    finally:
+        logging.getLogger("roboglot.recording").removeHandler(warnings)
     print(reports.table(comparison))
     sys.exit(not comparison.passes(at_least))
 

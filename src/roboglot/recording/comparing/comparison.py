@@ -70,13 +70,16 @@ class Row:
 class Comparison:
     """All rows of messages, by door and operation, and those of what the robots did.
 
-    ``figures``: what was compared of the robots' places, in words; ``reason``: why they were not compared.
+    ``figures``: what was compared of the robots' places, in words; ``reason``: why they were not compared. ``robot``:
+    the only one compared; ``notes``: what could not be read of the recordings.
     """
 
     rows: list[Row]
     drive: list[Row] = field(default_factory=list)
     figures: str = ""
     reason: str = ""
+    robot: str = ""
+    notes: list[str] = field(default_factory=list)
 
     @property
     def messages(self) -> float:

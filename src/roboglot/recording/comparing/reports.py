@@ -60,8 +60,16 @@ def page(comparison: Comparison, names: tuple[str, str]) -> str:
         '<!doctype html><html lang="en"><meta charset=utf-8><title>roboglot compare</title>',
         '<meta name="viewport" content="width=device-width">',
         f"<style>{STYLE}</style><h1>{f'{total} agree' if total else 'Nothing was compared'}</h1>",
-        f"<p>{escape(names[0])} and {escape(names[1])}</p>",
+        f"<p>first: {escape(names[0])}<br>second: {escape(names[1])}</p>",
     ]
+    if comparison.robot:
+        parts.append(f"<p>robot {escape(comparison.robot)}</p>")
+    parts += [f"<p class=bad>{escape(note)}</p>" for note in comparison.notes]
+    if comparison.drive and comparison.doors:
+        shares = percent(comparison.messages), percent(comparison.driven)
+        parts.append(
+            f"<p>{shares[0]} of the messages agree, and {shares[1]} of the drive; the smaller share counts.</p>"
+        )
     for door in comparison.doors:
         of_door = comparison.of(door)
         parts += _html_table(f"{door}: {percent(of_door.fidelity)}", of_door.rows)

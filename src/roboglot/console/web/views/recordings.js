@@ -20,6 +20,7 @@ async function refresh() {
 async function remove(file) {
   if (!confirm(t("recordings.sure", { file }))) return;
   try { await fetched("/api/recording", { do: "delete", file }); } catch (error) { say(t("refused", { why: error.message }), true); }
+  if (first.value === file) first.value = "";
   await refresh();
 }
 
