@@ -42,20 +42,16 @@ def refuse(*_: object, **__: object) -> None:
 
 
 @pytest.mark.world("empty", body="hermes")
-async def test_pose_is_set_when_it_is_answered(driven: Robot, robot: Robot, rest: OpenRest) -> None:
-    front = await rest(driven)
-    await front.set_pose(Pose3D(1.0, 0.5, 0.0, 0.0))
-    assert robot[Localization].pose.x == pytest.approx(1.0, abs=0.01)
-
-
-@pytest.mark.world("empty", body="hermes")
-async def test_refused_pose_is_refused_in_front(
+async def test_pose_is_set_or_refused_when_answered(
     driven: Robot, robot: Robot, rest: OpenRest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     front = await rest(driven)
+    await front.set_pose(Pose3D(1.0, 0.5, 0.0, 0.0))
+    assert robot[Localization].pose.x == pytest.approx(1.0, abs=0.01)
     monkeypatch.setattr(robot[Localization], "set_pose", refuse)
     with pytest.raises(SlamwareRefused, match="not now"):
-        await front.set_pose(Pose3D(1.0, 0.5, 0.0, 0.0))
+        await front.set_pose(Pose3D(2.0, 0.5, 0.0, 0.0))
+    assert robot[Localization].pose.x == pytest.approx(1.0, abs=0.01)
 
 
 @pytest.mark.world("empty", body="hermes")

@@ -19,6 +19,13 @@ from roboglot.storage.postgresql_connection import LimitedConnection, Patience
 from roboglot.storage.settings import StoredSettings
 from tests.storage.postgresql_server import PostgreSQLServer, needs_postgresql
 
+UNREACHABLE = {"the database cannot be reached"}
+
+
+def ten_saves(settings: StoredSettings) -> asyncio.Future[list[BaseException | None]]:
+    """Ask for ten saves at once, whose errors are their results."""
+    return asyncio.gather(*(settings.put("x", number) for number in range(10)), return_exceptions=True)
+
 
 @needs_postgresql
 async def test_silent_server_fails_what_waits_for_it(
@@ -35,10 +42,10 @@ async def test_silent_server_fails_what_waits_for_it(
     monkeypatch.setattr(Patience, "answer_max", 0.2)
     monkeypatch.setattr(postgresql, "connect", lambda *_: (_ for _ in ()).throw(psycopg.OperationalError("silence")))
     try:
-        saving = asyncio.ensure_future(asyncio.gather(settings.put("x", 2), return_exceptions=True))
+        saving = ten_saves(settings)
         await asyncio.wait([saving], timeout=30.0)
         assert saving.done()
-        assert str(saving.result()[0]) == "the database cannot be reached"
+        assert {str(failed) for failed in saving.result()} == UNREACHABLE
     finally:
         monkeypatch.undo()
         for (process,) in ours:
@@ -67,10 +74,10 @@ async def test_work_that_waits_shares_a_failed_connection(
     try:
         with monkeypatch.context() as patch:
             patch.setattr(postgresql, "connect", fail)
-            saving = asyncio.gather(*(settings.put("x", number) for number in range(10)), return_exceptions=True)
+            saving = ten_saves(settings)
             await asyncio.sleep(0)  # all are asked for
             all_wait.set()
-            assert {str(failed) for failed in await saving} == {"the database cannot be reached"}
+            assert {str(failed) for failed in await saving} == UNREACHABLE
     finally:
         db_server.start()
     assert len(tries) == 1
@@ -98,9 +105,9 @@ async def test_closing_waits_little_for_silent_servers(
         ends = "SELECT pg_terminate_backend(pid, 5000) FROM pg_stat_activity WHERE application_name='roboglot'"
         connection.execute(ends)
         with db_server.hanging():
-            saving = asyncio.gather(*(settings.put("x", number) for number in range(10)), return_exceptions=True)
+            saving = ten_saves(settings)
             await asyncio.to_thread(connecting.wait, 30.0)
             began = uptime()
             await asyncio.to_thread(database.close)
-            assert {str(failed) for failed in await saving} == {"the database cannot be reached"}
+            assert {str(failed) for failed in await saving} == UNREACHABLE
             assert uptime() - began < postgresql_connection.CONNECT_MAX / 2
