@@ -13,6 +13,7 @@ import httpx
 import msgspec
 import pytest
 
+from roboglot.model.components.energy.power import Power, PowerMode
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.motion.actions import FACTORIES
 from roboglot.protocols.slamware.dispatch import TABLE
@@ -118,6 +119,34 @@ def test_move_options_are_known_or_refused(name: str) -> None:
 
 
 @pytest.mark.world("empty")
+def optional_bodies() -> Iterator[str]:
+    """Operations whose bodies need no field."""
+    for key in sorted(TABLE.implemented()):
+        body = inspect.signature(TABLE[key].handler, eval_str=True).parameters.get("body")
+        for kind in typing.get_args(body.annotation) or (body.annotation,) if body else ():
+            if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+                known = fields(kind).values()
+                if known and not any(required for _, required in known):
+                    yield key
+
+
+async def test_misspelt_bodies_change_nothing(robot: Robot, client: httpx.AsyncClient) -> None:
+    """A misspelt delay shut the robot down at once, and misspelt hours cleared those set."""
+    hours = {"hours": [{"start_time": "08:00:00", "end_time": "18:00:00"}], "restdays": [0]}
+    assert (await client.put(f"{ADMIN}/working_time", json=hours)).status_code == 200
+    tried = list(optional_bodies())
+    assert len(tried) >= 10
+    for key in tried:
+        method, path = key.split(" ")
+        path = path.format(poi_id="x", usage="restricted_area", id=1, dock_id="d")
+        reply = await client.request(method, path, json={"hour": 1})
+        assert (reply.status_code, "hour is unknown; " in reply.text) == (400, True), (key, reply.text)
+    assert (await client.get(f"{ADMIN}/working_time")).json() == hours
+    assert robot[Power].mode is PowerMode.AWAKE
+    known_too = await client.put(f"{ADMIN}/line_speed", json={"delivery_speed": 0.3, "later": 1})
+    assert known_too.status_code == 200  # as firmware sends more fields than the manual has
+
+
 async def test_unknown_flags_are_refused_by_name(robot: Robot, client: httpx.AsyncClient) -> None:
     options = {"target": {"x": 1, "y": 0}, "move_options": {"mode": 0, "flags": ["with_yaw", "fly"]}}
     body = {"action_name": "slamtec.agent.actions.MoveToAction", "options": options}

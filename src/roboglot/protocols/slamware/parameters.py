@@ -14,12 +14,14 @@ from roboglot.protocols.slamware.chapters.firmware.uploads import PACKAGE_MAX, U
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError, bad_request
 from roboglot.protocols.slamware.routes import SHORTHANDS, Match
+from roboglot.spelling import brief, instead
 from roboglot.validation import why_invalid
 
 BODY_MAX = 1 << 20  # bytes of a JSON body
 UPLOAD_MAX = 64 << 20  # bytes of a binary body
 UPLOADS_MAX = 4  # at a time
 QUERY_FIELDS_MAX = 32
+WORD_MAX = 60  # characters of an unknown field's name in an answer
 WHOLE_MAX = 2.0**53  # beyond it floats cannot represent every integer
 
 
@@ -45,10 +47,13 @@ class Parameters:
             if not body and not operation.requires("body"):
                 return values
             try:
-                values["body"] = msgspec.convert(whole_numbers(msgspec.json.decode(body)), kind)
+                sent = whole_numbers(msgspec.json.decode(body))
+                values["body"] = msgspec.convert(sent, kind)
             except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
                 why = why_invalid(error, "the body", wanted=kind) if body else "a JSON body is needed"
                 raise bad_request(operation.key, why) from None
+            if why := _why_unknown(sent, values["body"]):
+                raise bad_request(operation.key, why)
         return values
 
     def named(self, operation: Operation[str], match: Match, scope: Scope) -> dict[str, object]:
@@ -92,6 +97,15 @@ class Parameters:
                 upload.close()
                 raise
             return upload
+
+
+def _why_unknown(sent: object, body: object) -> str:
+    """Return what is wrong if no field that was sent is known: the answer would be a success, for nothing done."""
+    names = body.__struct_encode_fields__ if isinstance(body, msgspec.Struct) else ()
+    if not isinstance(sent, dict) or not sent or not names or not sent.keys().isdisjoint(names):
+        return ""
+    word = next(iter(sent))
+    return f"{brief(word, WORD_MAX)} is unknown{instead(word, names)}"
 
 
 def whole_numbers(value: object) -> object:
