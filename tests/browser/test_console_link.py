@@ -131,14 +131,18 @@ async def test_orders_wait_after_a_stop(open_console: OpenConsole, served: Serve
     page = await open_console(language="zh")
     await page.click("#tab-actions")
     await shows(page, ORDERS, ["送餐到 room 执行中", "带人去 room 等待中"])
+    await page.evaluate("location.hash = '#/robots'")
+    await until(page, "document.querySelector('.tile')?.textContent.includes('正在前往 room')")
+    await page.evaluate("location.hash = '#/live'")
     await page.click(".stop")
     await becomes(lambda: asyncio.sleep(0, robot[Delivery].executing), wanted=False)
     await page.reload()
     await until(page, "document.querySelector('.banner')?.textContent.includes('订单在等待')")
     await page.click("#tab-actions")
-    for left in (1, 0):
-        await page.locator(f"{LIST} button").first.click()
-        await shows(page, f"document.querySelectorAll('{LIST} button').length", left)
+    await served.clock.advance(2.0)  # the robot brakes, and the order under way has failed
+    await shows(page, f"document.querySelectorAll('{LIST} button').length", 1)
+    await page.click(f"{LIST} button")
+    await shows(page, f"document.querySelectorAll('{LIST} button').length", 0)
     await page.click(".banner button")
     await until(page, "!document.querySelector('.banner')")
     assert robot[Delivery].executing

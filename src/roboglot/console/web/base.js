@@ -108,6 +108,9 @@ export function robotWord(word) {
   return spoken()[`robot.${word}`] ?? spoken()[`studio.state.${word}`] ?? translated(word);
 }
 
+/** What a robot does: the progress of its order, else its newest action; empty: nothing. @param {any} state */
+export const doing = (state) => robotWord(state?.orders?.list[0]?.doing || state?.actions.at(-1)?.name || "");
+
 effect(() => {
   document.documentElement.lang = language.value === "zh" ? "zh-CN" : "en";
   document.documentElement.dataset.theme = theme.value;

@@ -2,7 +2,7 @@
 import { render } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import { signal } from "@preact/signals";
-import { Button, Icon, html, language, loadWords, place, robotWord, t, theme } from "../base.js";
+import { Button, Icon, doing, html, language, loadWords, place, robotWord, t, theme } from "../base.js";
 
 const LOOK = 1000; // ms between two looks
 const SEEN_MAX = 100; // robots that are asked for at once
@@ -51,7 +51,6 @@ function Tile({ robot, world }) {
     return () => { watcher.unobserve(tile); seen.delete(robot.name); };
   }, [robot.name]);
   const up = world.state === "ready", state = up ? states.value[robot.name] : undefined, known = state && !state.error;
-  const task = known ? state.actions[state.actions.length - 1] : undefined;
   const worst = known ? ["FATAL", "ERROR", "WARNING"].find((level) => state.faults.some((/** @type {any} */ f) => f.level === level)) : undefined;
   const kind = up ? worst?.toLowerCase() ?? (lost.value ? "warning" : "") : "error";
   return html`<li class=${`tile ${kind}`} ref=${self} data-robot=${robot.name}>
@@ -59,7 +58,7 @@ function Tile({ robot, world }) {
     <h2>${t("robot.named", { name: robot.name })}<small>${robot.body} · ${robot.address}</small></h2>
     ${lost.value && html`<p class="warned">${t("link.stale")}</p>`}<dl><div class="row"><dt>${t("fleet.world")}</dt><dd>${world.name} · ${up ? t("fleet.pace", { factor: world.factor.toFixed(2) }) : t(`fleet.${world.state}`)}</dd></div>
       ${known && html`<div class="row"><dt>${t("battery")}</dt><dd class=${state.battery?.low ? "bad" : ""}>${state.battery ? `${Math.round(state.battery.charge * 100)} %` : "–"}${state.battery?.charging ? ` · ${t("charging")}` : ""}</dd></div>
-      <div class="row"><dt>${t("task")}</dt><dd>${task ? robotWord(task.name) : state.safety.docked ? t("docked") : t("task.none")}</dd></div>
+      <div class="row"><dt>${t("task")}</dt><dd>${doing(state) || (state.safety.docked ? t("docked") : t("task.none"))}</dd></div>
       <div class="row"><dt>${t("control")}</dt><dd>${state.control.taken_by || state.control.holder || t("control.nobody")}</dd></div>`}</dl>
     ${!up && world.reason ? html`<p class="warned"><${Icon} name="alert" size=${16} />${t("fleet.why", { why: world.reason })}</p>` : null}
     ${state?.error ? html`<p class="muted">${t("fleet.why", { why: state.error })}</p>` : null}

@@ -1,7 +1,7 @@
 // The class: pupils join by a code and get a robot each; the teacher sees who is where, locks, resets, gives back.
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
-import { Button, fetched, html, robotWord, say, t, translated } from "../base.js";
+import { Button, doing, fetched, html, say, t, translated } from "../base.js";
 import { choose, states } from "../link.js";
 
 const LOOK = 1000; // ms between two looks at who is there
@@ -21,9 +21,9 @@ function Open() {
 }
 
 function Pupil({ pupil }) {
-  const state = states.value[pupil.robot], task = state?.actions.at(-1), own = { pupil: pupil.identity };
+  const state = states.value[pupil.robot], own = { pupil: pupil.identity };
   return html`<li class=${`tile ${pupil.here ? "" : "warning"}`}><h2>${pupil.name}<small>${t("robot.named", { name: pupil.robot })} · ${t(pupil.here ? "class.here" : "class.away")}</small></h2>
-    <p>${pupil.locked ? t("class.locked") : task ? robotWord(task.name) : t("task.none")}${state?.battery ? ` · ${Math.round(state.battery.charge * 100)} %` : ""}</p>
+    <p>${pupil.locked ? t("class.locked") : doing(state) || t("task.none")}${state?.battery ? ` · ${Math.round(state.battery.charge * 100)} %` : ""}</p>
     <div class="buttons"><${Button} kind="main" label=${t("show")} of=${pupil.name} onClick=${() => { choose(pupil.robot); location.hash = "#/live"; }} />
       <${Button} label=${t(pupil.locked ? "class.unlock" : "class.lock")} of=${pupil.name} on=${pupil.locked} onClick=${() => ask({ do: pupil.locked ? "unlock" : "lock", ...own })} />
       <${Button} label=${t("class.reset")} of=${pupil.name} onClick=${() => ask({ do: "reset", ...own })} />

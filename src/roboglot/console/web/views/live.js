@@ -1,6 +1,6 @@
 // The live view: map, tools to send the robot somewhere, and beside it what it is, does and has done.
 import { signal } from "@preact/signals";
-import { Button, Icon, can, duration, fixed, html, person, robotWord, say, t } from "../base.js";
+import { Button, Icon, can, doing, duration, fixed, html, person, robotWord, say, t } from "../base.js";
 import { MapView } from "../map.js";
 import { command, current, introduce, me, poses, simulated, stale, state, wanted, you } from "../link.js";
 import { Drive } from "./drive.js";
@@ -117,7 +117,7 @@ function Running({ action }) {
 function Actions() {
   const { actions, history, refused } = state.value;
   return html`<div class="card"><h3>${t("actions.now")}</h3>
-      ${actions.length ? html`<ul class="actions">${actions.map((a) => html`<${Running} key=${a.id} action=${a} />`)}</ul>` : html`<p class="muted">${t("actions.none")}</p>`}
+      ${actions.length ? html`<ul class="actions">${actions.map((a) => html`<${Running} key=${a.id} action=${a} />`)}</ul>` : html`<p class="muted">${doing(state.value) || t("actions.none")}</p>`}
       ${refused && html`<p class="warned">${t("actions.refused", { who: refused.client, doing: robotWord(refused.doing), why: refused.reason })}</p>`}</div>
     ${state.value.orders?.list.length ? html`<${Orders} />` : null}
     <div class="card"><h3>${t("actions.before")}</h3>

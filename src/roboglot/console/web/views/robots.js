@@ -1,6 +1,6 @@
 // All robots at a glance: charge, task, trouble, who has them; one click into one, one to stop them all.
 import { useEffect, useState } from "preact/hooks";
-import { Button, Icon, fixed, html, robotWord, say, t } from "../base.js";
+import { Button, Icon, doing, fixed, html, robotWord, say, t } from "../base.js";
 import { ask, choose, hello, poses, states, status } from "../link.js";
 
 async function stopAll() {
@@ -24,14 +24,14 @@ function Thumbnail({ name }) {
 function Tile({ robot }) {
   const state = states.value[robot.name], pose = poses.value[robot.name];
   if (!state) return html`<li class="tile"><h2>${robot.name}</h2></li>`;
-  const { battery, faults, actions, control, safety, about } = state, task = actions[actions.length - 1];
+  const { battery, faults, control, safety, about } = state;
   const worst = ["FATAL", "ERROR", "WARNING"].find((level) => faults.some((f) => f.level === level));
   const lost = status.value === "lost";
   const open = () => { choose(robot.name); location.hash = "#/live"; };
   return html`<li class=${`tile ${worst ? worst.toLowerCase() : lost ? "warning" : ""}`}>
     ${pose && !lost && state.parts.includes("mapping") && html`<${Thumbnail} name=${robot.name} />`}<h2>${t("robot.named", { name: robot.name })}<small>${about.maker} ${about.model}</small></h2>
     ${lost && html`<p class="warned">${t("link.stale")}</p>`}<dl><div class="row"><dt>${t("battery")}</dt><dd class=${battery?.low ? "bad" : ""}>${battery ? `${Math.round(battery.charge * 100)} %` : "–"}${battery?.charging ? ` · ${t("charging")}` : ""}</dd></div>
-      <div class="row"><dt>${t("task")}</dt><dd>${task ? robotWord(task.name) : safety.docked ? t("docked") : t("task.none")}</dd></div>
+      <div class="row"><dt>${t("task")}</dt><dd>${doing(state) || (safety.docked ? t("docked") : t("task.none"))}</dd></div>
       <div class="row"><dt>${t("control")}</dt><dd>${control.taken_by || control.holder || t("control.nobody")}</dd></div>
       <div class="row"><dt>${t("pose")}</dt><dd>${pose ? `${fixed(pose[0], 1)}, ${fixed(pose[1], 1)} m` : "–"}</dd></div></dl>
     ${safety.emergency_stop ? html`<p class="warned"><${Icon} name="alert" size=${16} />${t("estop.on")}</p>` : faults.length ? html`<p class="warned"><${Icon} name="alert" size=${16} />${robotWord(faults[0].name)}${faults.length > 1 ? ` +${faults.length - 1}` : ""}</p>` : !lost && html`<p class="allwell">${t("faults.none")}</p>`}
