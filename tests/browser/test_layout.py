@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.shards.overview import Overview
 from roboglot.shards.snapshots import Snapshots
 from tests.browser.served import PAGE_PATIENCE, PATIENCE, STILL, OpenConsole, Served, becomes
@@ -95,6 +96,19 @@ async def test_low_screens_show_everything(served: Served, open_console: OpenCon
             await page.set_viewport_size({"width": width, "height": height})
             await page.evaluate(DRAWN)
             assert await page.evaluate(COVERED_OR_CUT) == [], (view, width)
+
+
+async def test_banners_on_low_screens_cover_nothing(served: Served, open_console: OpenConsole) -> None:
+    page = await open_console()
+    served.robot[EmergencyStop].engage()
+    try:
+        await page.wait_for_selector(".banner")
+        for width, height in ((844, 390), (640, 400)):
+            await page.set_viewport_size({"width": width, "height": height})
+            await page.evaluate(DRAWN)
+            assert await page.evaluate(COVERED_OR_CUT) == [], width
+    finally:
+        served.robot[EmergencyStop].release()
 
 
 async def test_phone_shows_and_can_touch_everything(served: Served, open_console: OpenConsole) -> None:
