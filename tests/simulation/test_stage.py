@@ -10,14 +10,17 @@ from msgspec.structs import replace
 from roboglot.model.components.interaction.armor import Armor, PlatePlace
 from roboglot.model.components.interaction.blaster import Blaster
 from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
+from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.components.motion.motion_status import MotionStatus
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.range_sensor import RangeSensors
 from roboglot.model.errors import Collided, NotFound, Refused
 from roboglot.model.events import ArmorHit
-from roboglot.model.geometry import Point, Pose, Twist, Vector3
+from roboglot.model.geometry import Point, Pose, Twist, Vector3, wrap_angle
 from roboglot.model.sound import claps
+from roboglot.simulation.components.motion.emergency_stop import SimulatedEmergencyStop
 from roboglot.simulation.world.description import Box
 from roboglot.simulation.world.world_files import load_world
 from tests.narrowing import known
@@ -231,3 +234,52 @@ async def test_robot_goes_back_only_to_a_free_start(simulate):
     sim.world.stage.remove_obstacle(box)
     sim.world.stage.reset("a")
     assert sim.pose.distance_to(Pose(5.0, 5.0)) < 0.01
+
+
+@pytest.mark.parametrize("limp", [False, True])
+async def test_reset_dog_stands(simulate, limp):
+    sim = simulate("empty", body="cyberdog2", start=Pose(5.0, 5.0))
+    sim.world.start()
+    legs = sim.robot[Legs]
+    if limp:
+        legs.go_limp()
+    else:
+        legs.lie_down()
+    await sim.clock.advance(5.0)
+    assert legs.posture is not Posture.STANDING
+    sim.world.stage.reset("a")
+    await sim.clock.advance(0.5)
+    assert legs.posture is Posture.STANDING
+    sim.robot[Base].set_velocity(Twist(0.3, 0.0, 0.0))
+    await sim.clock.advance(3.0)
+    assert sim.world.truth.pose_of("a").x > 5.5
+
+
+async def test_reset_ends_emergency_stop_and_released_brake(simulate):
+    sim = simulate("empty", start=Pose(5.0, 5.0))
+    sim.world.start()
+    stop = sim.robot[EmergencyStop]
+    assert isinstance(stop, SimulatedEmergencyStop)
+    stop.press(True)
+    stop.release_brake(True)
+    await sim.clock.advance(1.0)
+    sim.world.stage.reset("a")
+    assert (stop.pressed, stop.engaged, stop.brake_released) == (False, False, False)
+    sim.robot[Base].set_velocity(Twist(0.3, 0.0, 0.0))
+    await sim.clock.advance(3.0)
+    assert sim.world.truth.pose_of("a").x > 5.5
+
+
+@pytest.mark.parametrize("yaw", [1e300, -4e10, 3 * math.pi])
+async def test_every_finite_heading_can_be_taken(simulate, yaw):
+    """Physics takes angles beyond 1e10 for an explosion, and puts all robots of the world at its origin."""
+    sim = simulate("empty", start=Pose(5.0, 5.0, yaw), robots=("a", "b"), compiled=False)
+    sim.world.start()
+    sim.world.stage.place("b", Pose(8.0, 5.0, yaw))
+    for robot in sim.robots.values():
+        robot[Base].set_velocity(Twist(0.2, 0.0, 0.0))
+    await sim.clock.advance(1.0)
+    for name, x in (("a", 5.0), ("b", 8.0)):
+        pose = sim.world.truth.pose_of(name)
+        assert pose.distance_to(Pose(x, 5.0)) < 0.25
+        assert abs(wrap_angle(pose.yaw - math.remainder(yaw, math.tau))) < 0.01

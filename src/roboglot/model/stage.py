@@ -197,9 +197,10 @@ class Stage(ABC):
 
     @abstractmethod
     def reset(self, name: str) -> None:
-        """Put a robot back where it started, charged as then, without its faults. Raises Refused if something is there.
+        """Put a robot back where it started, charged as then, on its legs, without its faults and emergency stop.
 
-        It keeps what it knows: like a robot that was carried, it has to find itself on its map.
+        It keeps what it knows: like a robot that was carried, it has to find itself on its map. Raises Refused if
+        something is in the way.
         """
 
     @abstractmethod

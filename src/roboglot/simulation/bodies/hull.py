@@ -152,7 +152,7 @@ class Hull(HullState):
             wheels = [pose.compose(Pose(x, y)) for x, y in wheel_places(self.body)]
             height += max(self._ground.height(wheel.x, wheel.y, floor) for wheel in wheels)
             self._data.qpos[self._q + 4 : self._q + 6] = 0.0
-        self._data.qpos[self._q : self._q + 4] = (pose.x, pose.y, height, pose.yaw)
+        self._data.qpos[self._q : self._q + 4] = (pose.x, pose.y, height, wrap_angle(pose.yaw))
         self._data.qvel[self._rates] = self._applied[self._rates] = 0.0
         self.hand, self.overturned, self.tilt = None, False, LEVEL
         self.floor = floor

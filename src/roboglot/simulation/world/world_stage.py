@@ -23,6 +23,8 @@ from roboglot.simulation.building.cards import Card, PrintedTag
 from roboglot.simulation.building.outline import plan_of
 from roboglot.simulation.components.energy.battery import SimulatedBattery
 from roboglot.simulation.components.interaction.armor import SimulatedArmor
+from roboglot.simulation.components.motion.emergency_stop import SimulatedEmergencyStop
+from roboglot.simulation.components.motion.legs import SimulatedLegs
 from roboglot.simulation.components.sensing.adapter import SimulatedSensorAdapters
 from roboglot.simulation.components.sensing.touch import SimulatedTouch
 from roboglot.simulation.people.stage_people import Actor
@@ -122,6 +124,10 @@ class WorldStage(Stage):
         self.place(name, pose, floor)
         if (battery := self._population.find(name, SimulatedBattery)) is not None:
             battery.reset()
+        if (stop := self._population.find(name, SimulatedEmergencyStop)) is not None:
+            stop.reset()
+        if (legs := self._population.find(name, SimulatedLegs)) is not None:
+            legs.reset()
 
     def refuse_reset(self, name: str) -> None:
         pose, floor = self._population.starts[name]

@@ -52,6 +52,11 @@ class SimulatedEmergencyStop(EmergencyStop):
             raise Refused("the emergency stop button on the robot is pressed")
         self._set(False)
 
+    def reset(self) -> None:
+        """Let go of the button, and end all requests."""
+        self._pressed = False
+        self._forget()
+
     @property
     def brake_released(self) -> bool:
         return self._released

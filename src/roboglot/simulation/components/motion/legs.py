@@ -144,6 +144,14 @@ class SimulatedLegs(Legs):
         self._torso.let_sink()
         self._become(Posture.LIMP)
 
+    def reset(self) -> None:
+        """Stand straight at once, as at the world's start."""
+        self._player.performance = self._torso.track = None
+        self._torso.put(self._section.standing)
+        self._torso.body = self._torso.straight
+        self._torso.take(self._torso.straight)
+        self._become(Posture.STANDING)
+
     def _start(self, name: str, run: Callable[[Action], Awaitable[None]], there: bool, goal: object, by: str) -> Action:
         # A body already in that posture does not interrupt a drive.
         return self._robot.actions.start(
@@ -160,13 +168,9 @@ class SimulatedLegs(Legs):
         pace = (self._section.standing - self._section.lying) / duration
         seconds = max(abs(goal.height - held.height) / pace, held.turn_to(goal) / TURN_RATE)
         self._become(Posture.CHANGING)
-        await self._follow(action, Track(held, goal, seconds))
-        self._become(wanted)
-
-    async def _follow(self, action: Action, track: Track) -> None:
-        """Move the torso along ``track``; never returns if another motion takes over."""
         self.duty.begin()
-        await self._torso.follow(track, action, self._clock, LOOK)
+        await self._torso.follow(Track(held, goal, seconds), action, self._clock, LOOK)
+        self._become(wanted)
 
     async def _brake(self) -> None:
         """Lock the base and wait until its wheels stand still; if cancelled while standing, unlock it again."""
@@ -204,7 +208,9 @@ class SimulatedLegs(Legs):
                 raise Refused(f"the robot holds no pose while {self._posture}")
             held = self._torso.body
             goal = Body(held.height if body.height is None else body.height, body.attitude, body.shift)
-            await self._follow(action, Track(held, goal, max(duration, held.turn_to(goal) / 4.0)))
+            track = Track(held, goal, max(duration, held.turn_to(goal) / 4.0))
+            self.duty.begin()
+            await self._torso.follow(track, action, self._clock, LOOK)
 
         return self._robot.actions.start(
             "hold the body", run, resources=[LEGS], goal=body, source=source, pausable=True
