@@ -98,6 +98,21 @@ def test_kernels_of_a_read_only_folder_are_used(tmp_path: Path, monkeypatch: pyt
     assert sorted(tmp_path.rglob("*.nb?")) == kept
 
 
+def test_a_kernel_compiled_again_elsewhere_is_not_linked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its functions have other names there: the caller's cache would abort every process that loads it."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    source = tmp_path / "doubling.py"
+    source.write_text("def double(x):\n    return 2 * x\n")
+    doubling = module_at(source)
+    kernel("int64(int64)")(doubling.double)
+    loaded = kernel("int64(int64)")(doubling.double)
+    for kept in tmp_path.rglob("*.nb?"):
+        kept.unlink()
+    kernel("int64(int64)")(doubling.double)  # as another process does that found none
+    with pytest.raises(RuntimeError, match="another process has compiled double again; start once more"):
+        njit("int64(int64)")(lambda x: loaded(x) + 1)
+
+
 def test_kernels_beside_read_only_sources_are_used(monkeypatch: pytest.MonkeyPatch) -> None:
     """An administrator has installed and compiled; each user would compile once more."""
     compile_ahead()

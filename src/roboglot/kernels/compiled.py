@@ -63,7 +63,8 @@ class StoredLibrary(JITCodeLibrary):
         self._finalized = self._disable_inspection = True
         self._shared_module = None
         self._reload_init: set[object] = set()  # set by a class between, before Numba 0.68
-        self.stored: Callable[[], bytes] | None = None  # returns the module
+        self.stored: Callable[[], tuple[bytes, bytes]] | None = None  # returns machine code and module
+        self._code = hash(code)
         codegen._engine._ee.add_object_file(ObjectFileRef.from_data(code))
 
     def get_pointer_to_function(self, name: str) -> int:
@@ -71,10 +72,17 @@ class StoredLibrary(JITCodeLibrary):
         return cast("int", self._codegen._engine.get_function_address(name))
 
     def _get_module_for_linking(self) -> ModuleRef:
-        """Return the module for a caller that is compiled; called by Numba."""
+        """Return the module for a caller that is compiled; called by Numba. Raises RuntimeError.
+
+        Each compilation gives its functions other names. A caller that was linked with another one's module would end
+        every process that loads it: LLVM aborts if a name is not found.
+        """
         if self._shared_module is None:
             assert self.stored is not None
-            self._shared_module = parse_bitcode(self.stored())
+            code, module = self.stored()
+            if hash(code) != self._code:
+                raise RuntimeError(f"another process has compiled {self.name} again; start once more")
+            self._shared_module = parse_bitcode(module)
         return self._shared_module
 
 
@@ -118,7 +126,7 @@ class LeanCache(FunctionCache):
             found: CompileResult | None = self._load_overload(signature, context)
         if found is not None:
             found = found._replace(type_annotation="")  # 3 MB of all
-            found.library.stored = partial(self._bitcode, self._index_key(signature, context.codegen()))
+            found.library.stored = partial(self._stored, self._index_key(signature, context.codegen()))
         return found
 
     def save_overload(self, signature: Signature, data: CompileResult) -> None:
@@ -126,12 +134,11 @@ class LeanCache(FunctionCache):
         if os.access(self.cache_path, os.W_OK):
             super().save_overload(signature, data)
 
-    def _bitcode(self, key: object) -> bytes:
-        """Return a library's module. Raises RuntimeError if another process has emptied the cache."""
+    def _stored(self, key: object) -> tuple[bytes, bytes]:
+        """Return a library's machine code and module. Raises RuntimeError if another process has emptied the cache."""
         if (found := self._cache_file.load(key)) is None:
             raise RuntimeError(f"{self._cache_file} is empty")
-        _, _, (_, bitcode) = found[0]  # name, kind, machine code and module
-        return cast("bytes", bitcode)
+        return cast("tuple[bytes, bytes]", found[0][2])  # after name and kind
 
 
 def _rebuild_env(module: str, constants: list[object], name: str) -> environment.Environment:
