@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Callable, Coroutine
 from pathlib import Path
 
 import pytest
@@ -13,11 +13,13 @@ from roboglot.model.clock import LockstepClock
 from roboglot.model.events import EventStream
 from roboglot.model.geometry import Pose
 from roboglot.model.maps import PointOfInterest
-from roboglot.storage.database import Database
+from roboglot.storage import postgresql
 from roboglot.storage.members import StoredMembers
+from roboglot.storage.opening import open_database
 from roboglot.storage.places import StoredPlaces
 from roboglot.storage.settings import StoredSettings
-from roboglot.storage.transactions import Connection, DiskFull
+from roboglot.storage.transactions import Connection, DiskFull, Transactions
+from tests.storage.postgresql_server import PostgreSQLServer, needs_postgresql
 
 Work = Callable[[Connection], object]
 
@@ -25,38 +27,37 @@ Work = Callable[[Connection], object]
 class Held:
     """A database that holds back writing from ``cancelled`` on, until that has cancelled the writer."""
 
-    def __init__(self, database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.database, self.failing = database, False
+    def __init__(self, database: Transactions, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.database, self.failing, self.hanging = database, False, False
         self._patch = monkeypatch
 
     async def cancelled(self, change: Coroutine[object, object, object]) -> None:
         """Cancel ``change`` while it is written; return once it is."""
         loop, writing, go = asyncio.get_running_loop(), asyncio.Event(), threading.Event()
-        transact = self.database._transact
+        transact: Callable[..., object] = vars(type(self.database))["_transact"]
 
-        def wait(work: Work) -> object:
+        def wait(work: Work, **options: float) -> object:
             loop.call_soon_threadsafe(writing.set)
             assert go.wait(60.0)
             if self.failing:
                 raise DiskFull("the disk is full")
-            return transact(work)
+            return transact(self.database, work, **options)
 
         with self._patch.context() as holding:
             holding.setattr(self.database, "_transact", wait)
             task = asyncio.ensure_future(change)
             await writing.wait()
             task.cancel()
-            loop.call_later(0.01, go.set)
+            if not self.hanging:
+                loop.call_later(0.01, go.set)
             with pytest.raises(asyncio.CancelledError):
                 await task
             go.set()
 
 
 @pytest.fixture
-def held(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Held]:
-    database = Database(tmp_path / "one.db")
-    yield Held(database, monkeypatch)
-    database.close()
+def held(database: Transactions, monkeypatch: pytest.MonkeyPatch) -> Held:
+    return Held(database, monkeypatch)
 
 
 async def test_member_of_a_client_that_left_is_listed(held: Held) -> None:
@@ -85,6 +86,19 @@ async def test_cancelled_and_failed_change_leaves_memory(held: Held) -> None:
 
     await held.cancelled(change())
     assert settings.get("one") is None
+
+
+@needs_postgresql
+async def test_server_that_hangs_keeps_no_cancelled_task(
+    db_server: PostgreSQLServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(postgresql, "OUTCOME_MAX", 0.01)
+    database = open_database(tmp_path / "unused", db_server.url)
+    held, settings = Held(database, monkeypatch), StoredSettings(database, "a")
+    held.hanging = True
+    await held.cancelled(settings.put("one", 1))
+    assert settings.get("one") is None
+    database.close()
 
 
 async def test_time_that_is_up_stays_a_time_out(held: Held) -> None:

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from roboglot.model.components.system.disk import Disk
-from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseError, DiskFull
+from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseError, DiskFull, outcome
 from roboglot.text_files import content_of
 
 T = TypeVar("T")
@@ -58,7 +58,7 @@ class Database:
         """
         if self._in_place:
             return self.run_now(work)
-        return await _outcome(asyncio.get_running_loop().run_in_executor(self._thread, self._transact, work))
+        return await outcome(asyncio.get_running_loop().run_in_executor(self._thread, self._transact, work))
 
     async def remove(self, work: Callable[[Connection], T]) -> T:
         """Run ``work`` that takes no room, as ``run`` does, also while the robot's disk is full."""
@@ -161,23 +161,6 @@ class Database:
             self._reader.close()
         self._thread.submit(self._connection.close).result()
         self._thread.shutdown()
-
-
-async def _outcome(writing: asyncio.Future[T]) -> T:
-    """Return the outcome of ``writing``; a task cancelled meanwhile goes on to its next wait."""
-    cancelled = False
-    try:
-        while True:
-            try:
-                return await asyncio.shield(writing)
-            except asyncio.CancelledError:
-                if writing.cancelled():
-                    raise
-                cancelled = True
-    finally:
-        if cancelled and (task := asyncio.current_task()) is not None:
-            task.uncancel()  # it counts once, for timeouts
-            task.cancel()
 
 
 def _without_cursor(result: T) -> T:

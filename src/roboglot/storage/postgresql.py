@@ -25,7 +25,7 @@ from roboglot.hosting.steady_time import uptime
 from roboglot.model.components.system.disk import Disk
 from roboglot.storage.database import schema_versions
 from roboglot.storage.postgresql_connection import LimitedConnection, Patience, close, connect, limited_by
-from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseError, DiskFull, Rows
+from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseError, DiskFull, Rows, outcome
 from roboglot.text_files import content_of
 from roboglot.transport.log_limiter import LogLimiter
 
@@ -34,6 +34,7 @@ log = logging.getLogger(__name__)
 limited_log = LogLimiter(log)
 
 CONNECTIONS_MAX = 4
+OUTCOME_MAX = 1.0  # s that a cancelled caller waits for the server
 CLAIM_MAX = 6000  # ms; the server notices within five seconds that a machine is gone
 CLAIM_LOCKS = 0x626F74  # the class of the locks by which a program claims its robots
 PIECE_MIN = 3  # characters of a password that an error may not show
@@ -94,12 +95,13 @@ class PostgreSQL:
     async def run(self, work: Callable[[Connection], T]) -> T:
         """Run ``work`` as one transaction in a thread; an exception rolls it back.
 
-        Raises DatabaseError, even if the transaction may have been committed, as the connection broke at its end.
+        A caller that is cancelled meanwhile still gets the outcome, unless the server hangs. Raises DatabaseError, even
+        if the transaction may have been committed, as the connection broke at its end.
         """
         if self._in_place:
             return self.run_now(work)
         writing = functools.partial(self._transact, work, asked=uptime())
-        return await asyncio.get_running_loop().run_in_executor(self._threads, writing)
+        return await outcome(asyncio.get_running_loop().run_in_executor(self._threads, writing), OUTCOME_MAX)
 
     run_together = run  # the server itself combines disk flushes of transactions that end together
 

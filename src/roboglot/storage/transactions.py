@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, Protocol, Self, TypeVar
 
@@ -81,3 +82,28 @@ class Transactions(Protocol):
 
     def close(self) -> None:
         """Finish queued work, then close the database."""
+
+
+async def outcome(writing: asyncio.Future[T], patience: float | None = None) -> T:
+    """Return the outcome of ``writing``; a task cancelled meanwhile goes on to its next wait.
+
+    ``patience``: real seconds that a cancelled task waits for the outcome at most.
+    """
+    cancelled, giving_up = False, None
+    try:
+        while True:
+            try:
+                return await asyncio.shield(writing)
+            except asyncio.CancelledError:
+                if writing.cancelled():
+                    cancelled = False  # the task ends here
+                    raise
+                if patience is not None and giving_up is None:
+                    giving_up = asyncio.get_running_loop().call_later(patience, writing.cancel)
+                cancelled = True
+    finally:
+        if giving_up is not None:
+            giving_up.cancel()
+        if cancelled and (task := asyncio.current_task()) is not None:
+            task.uncancel()  # it counts once, for timeouts
+            task.cancel()
