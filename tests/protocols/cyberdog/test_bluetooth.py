@@ -65,7 +65,7 @@ async def test_scan_connect_and_history(client, robot, gadget, forward) -> None:
     assert await client.ask(8001, {}) == {"device_info_list": []}  # the history omits the connected one
     again = (await client.ask(8001, {"scan_seconds": 3}))["device_info_list"]  # at once, without a scan
     assert {device["mac"] for device in again} == {device["mac"] for device in found}, "the last scan's list"
-    for wrong in NO_OBJECTS:
+    for wrong in (*NO_OBJECTS, {"device": found[0]}):
         assert await client.ask(8002, wrong) == {"error_code": 323}
     assert robot[Bluetooth].connected is not None
     assert await client.ask(8002) == {"result": 0}
@@ -75,7 +75,7 @@ async def test_scan_connect_and_history(client, robot, gadget, forward) -> None:
     assert await client.ask(8006) == {"connected": False, "persentage": 0.0}
     assert [d["mac"] for d in (await client.ask(8001, {}))["device_info_list"]] == [BRACELET]
     assert await client.ask(8007, {"mac": HEADPHONES}) == {"success": False}
-    for not_said in ({"mac": 7}, *NO_OBJECTS):
+    for not_said in ({"mac": 7}, {"address": HEADPHONES}, *NO_OBJECTS):
         assert await client.ask(8007, not_said) == {"error_code": 323}
     assert [device.address for device in robot[Bluetooth].history] == [BRACELET], "nothing is forgotten"
     assert await client.ask(8007, {"mac": BRACELET}) == {"success": True}

@@ -160,11 +160,16 @@ def _fields_of(call: Call) -> Mapping[str, object]:
 def _valid_values(
     call: Call, values: Mapping[str, object], fields: type[Struct]
 ) -> tuple[Mapping[str, object], list[str]]:
-    """Return the valid values, and why the others are invalid; log the reasons and unknown names."""
+    """Return the valid values, and why the others are invalid; log the reasons and unknown names.
+
+    Raises BadParameters where no name is known, and none would do more than was asked.
+    """
     valid, wrong = fitting(values, fields), []
     if len(valid) < len(values):
         wrong = mismatches(values, fields)
         unknown = unknown_names(values, fields, UNUSED.get(call.code, frozenset()))
+        if call.code in WITH_FIELDS and len(unknown) == len(values):
+            raise BadParameters("; ".join(unknown))
         if ignored := "; ".join([*wrong, *unknown]):
             limited_log.warning(f"{call.code} {ignored}", "%d: ignored: %s", call.code, ignored)
     return valid, wrong

@@ -102,7 +102,8 @@ SILENT_WITHOUT_SERVICE = frozenset(
     {1001, *range(1020, 1025), 3001, 3002, 3011, 3012, 3014, 5001, 5002, 5003, 5004, 5006, 7001, 7002, 9030, 9031}
 )
 
-# Requests that without fields disconnect or forget a device: of these, other JSON than an object is refused.
+# Requests that without fields disconnect or forget a device: of these, other JSON than an object is refused, and an
+# object that has only unknown fields.
 WITH_FIELDS = frozenset({Code.CONNECT_BLUETOOTH, Code.FORGET_BLUETOOTH})
 
 # Fields that have no effect on real dogs either, by request.
