@@ -249,6 +249,16 @@ async def test_hibernation_is_silent_until_it_ends(yard: Opened) -> None:
     assert one.robot[Power].mode is PowerMode.AWAKE
 
 
+async def test_actions_of_misspelt_parameters_fail(yard: Opened) -> None:
+    """The robot slept for good, without the time at which it should wake up."""
+    one = await yard()
+    wrong = action("startHibernation", "s", wakeupTime="2026-01-01T00:00:00Z"), action("cancelOrder", "c", order="x")
+    one.control.send("instantActions", instant(*wrong))
+    await one.until(lambda: [states(one).get(id, ("",))[0] for id in "sc"] == ["FAILED", "FAILED"])
+    assert states(one)["s"][1] == "wakeupTime is unknown; did you mean 'wakeUpTime'?"
+    assert one.robot[Power].mode is PowerMode.AWAKE
+
+
 async def test_refused_hibernation_keeps_the_order(yard: Opened, monkeypatch: pytest.MonkeyPatch) -> None:
     """A driven dog only saves power by itself, and a driven Slamware robot only sleeps."""
     one = await yard()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Mapping
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Protocol
 
@@ -13,6 +14,7 @@ from roboglot.operations import BadParameters, Operation
 from roboglot.protocols.vda5050.error_book import ErrorBook
 from roboglot.protocols.vda5050.errors import Rejected
 from roboglot.protocols.vda5050.order_book import ActionState, ActionStatus
+from roboglot.spelling import brief, instead
 from roboglot.wire.vda5050.versions import ErrorKind, Level
 
 if TYPE_CHECKING:
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from roboglot.wire.vda5050.versions import Version
 
 log = logging.getLogger(__name__)
+WORD_MAX = 60  # characters of an unknown parameter's name in an error
 _DOING: ContextVar[ActionState] = ContextVar("doing")  # the action of the present task
 
 
@@ -104,6 +107,7 @@ class Performer:
             context.check(operation.key, operation.right)
             if lacking := [kind.__name__ for kind in operation.needs if kind not in context.robot]:
                 raise Rejected(ErrorKind.INSTANT_ACTION, f"this robot has no {lacking[0]}")
+            _check_known(operation, action.values)
             state.result = await operation.call(context, action.values) or ""
             state.status = ActionStatus.FINISHED
         except asyncio.CancelledError:
@@ -125,6 +129,14 @@ class Performer:
             context.errors.report(ErrorKind.ACTION_FAILED, Level.WARNING, why, {"actionId": action.action_id})
         finally:
             context.touch()
+
+
+def _check_known(operation: Operation[str], values: Mapping[str, object]) -> None:
+    """Raise BadParameters if no parameter that was sent is known: the action would do another thing than was asked."""
+    known = operation.parameters.__struct_encode_fields__
+    if values and known and values.keys().isdisjoint(known):
+        word = next(iter(values))
+        raise BadParameters(f"{brief(word, WORD_MAX)} is unknown{instead(word, known)}")
 
 
 def _hold(part: RobotAction, state: ActionState, on: bool) -> None:
