@@ -190,3 +190,19 @@ async def test_a_round_passes_its_stops_in_turn(robot: Robot, world: World, cloc
     assert status_of(robot, order) is OrderStatus.SUCCEEDED
     goals = [Point(*spots[name]) for name in (*tour, "home desk")]
     assert passed_in_order(track, goals, 0.08) == len(goals)
+
+
+@pytest.mark.world("empty")
+async def test_orders_go_on_after_a_full_disk(robot: Robot, world: World, clock: LockstepClock) -> None:
+    """The order under way stayed so for ever, and none began any more until the program was restarted."""
+    await robot[Places].put(ROOM)
+    requests = [OrderRequest(OrderKind.RETURN, "room"), OrderRequest(OrderKind.GUIDE, "room")]
+    first, second = await robot[Delivery].accept(*requests)
+    await clock.advance(3.0)
+    (fault,) = world.faults.inject("full_disk", "a")
+    await clock.advance(30.0)
+    assert (status_of(robot, first), status_of(robot, second)) == (OrderStatus.RUNNING, OrderStatus.READY)
+    world.faults.clear(fault.number)
+    await clock.advance(30.0)
+    assert status_of(robot, first).ended
+    assert status_of(robot, second) is OrderStatus.SUCCEEDED

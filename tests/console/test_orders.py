@@ -100,3 +100,16 @@ async def test_orders_wait_while_control_is_taken(served: ServedConsole) -> None
     await robot[Lease].release()
     await clock.advance(20.0)
     assert status_of(robot, guide) is OrderStatus.SUCCEEDED
+
+
+async def test_stop_on_a_full_disk_stands_and_holds(served: ServedConsole) -> None:
+    await order(served.robot, OrderKind.FOOD, OrderKind.RETURN)
+    await served.clock.advance(20.0)
+    assert served.runtime.fleet.world is not None
+    served.runtime.fleet.world.faults.inject("full_disk", "a")
+    status, answer = await served.ask("/api/robots/a/stop", {})
+    assert (status, answer["error"]) == (
+        409,
+        "it stands, but its orders are held only until a restart: the disk is full",
+    )
+    assert not served.robot[Delivery].executing

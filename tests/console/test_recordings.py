@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 from io import BytesIO
 from pathlib import Path
@@ -15,9 +16,10 @@ from roboglot.console.recordings import kept
 from roboglot.console.recordings.kept import RecordingFolder
 from roboglot.model.errors import Busy, NotFound, Refused
 from roboglot.recording.entries import NANO, Entry
-from roboglot.recording.files import Files, Limits, Origin
+from roboglot.recording.files import Files, Limits, Origin, PartWriter
 from roboglot.recording.redaction import Redaction
 from tests.console.conftest import ServedConsole
+from tests.narrowing import known
 
 FACTS = {"version": "1", "world": "office", "robots": '{"a": "universal", "b": "cyberdog2"}'}
 
@@ -225,3 +227,22 @@ async def test_comparison_without_memory_is_refused(tmp_path: Path, monkeypatch:
             )
         assert refused.value.status == 409
     assert refused.value.why == "out of memory: the recordings are too large to be compared"
+
+
+async def test_a_full_disk_ends_a_recording(served: ServedConsole, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every page showed REC on, and the next recording was refused until a person had ended that one."""
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    assert (await served.ask("/api/recording", {"do": "start"}))[1]["on"]
+    with monkeypatch.context() as disk:
+        disk.setattr(PartWriter, "flush", full)
+        await served.clock.advance(2.0)
+        await asyncio.to_thread(known(served.runtime.recorder._thread).settle)
+        ended = (await served.ask("/api/recording"))[1]
+        assert (ended["on"], ended["failure"]) == (False, "the recording ended early: the disk is full")
+        assert (await served.ask("/api/recording", {"do": "mark", "text": "late"}))[0] == 409
+    again = (await served.ask("/api/recording", {"do": "start"}))[1]
+    assert (again["on"], again["failure"]) == (True, "")
+    assert (await served.ask("/api/recording", {"do": "stop"}))[0] == 200

@@ -24,6 +24,7 @@ from roboglot.model.robot import Robot
 
 log = logging.getLogger(__name__)
 HOURS_LOOK = 10.0  # s between two checks of the opening hours while idle
+STORE_RETRY = 5.0  # s until it tries again to store how an order begins or ends
 BASE_LOOK = 1.0  # s between two checks whether another client still drives the robot
 
 
@@ -123,7 +124,10 @@ class Courier:
                 if self._robot.actions.running(BASE):
                     await self._robot.clock.sleep(BASE_LOOK)  # the current driver may finish
                     continue
-                await self._carry_out(order)
+                try:
+                    await self._carry_out(order)
+                except RobotError as error:  # the database's
+                    await self._wait_for_room(order, error)
             elif self._may_rest:
                 await self._rest()
             else:
@@ -160,13 +164,26 @@ class Courier:
             log.info("robot %s: order %s failed: %s", self._robot.id, order.number, error)
             status, failure = OrderStatus.FAILED, Failure.REFUSED
         self.phase, self.current = Phase.IDLE, None
-        order = self._book.get(order.id)
-        if order.status is OrderStatus.CANCELING:
-            status, failure = OrderStatus.CANCELED, order.failure
-        if not order.status.ended:
-            order = await self._book.change(order.id, status=status, failure=failure or order.failure)
-        if status is OrderStatus.FAILED:
+        order = await self._end(order.id, status, failure)
+        if order.status is OrderStatus.FAILED:
             await follow_up(self._robot, self._book, self._driver, self.readiness, order)
+
+    async def _end(self, id: str, status: OrderStatus, failure: Failure | None) -> Order:
+        """Store how an order ended, and return it; while that cannot be stored, no other order begins."""
+        while True:
+            order = self._book.get(id)
+            if order.status.ended:
+                return order
+            if order.status is OrderStatus.CANCELING:
+                status, failure = OrderStatus.CANCELED, order.failure
+            try:
+                return await self._book.change(id, status=status, failure=failure or order.failure)
+            except RobotError as error:
+                await self._wait_for_room(order, error)
+
+    async def _wait_for_room(self, order: Order, error: RobotError) -> None:
+        log.warning("robot %s: cannot store order %s: %s", self._robot.id, order.number, error)
+        await self._robot.clock.sleep(STORE_RETRY)
 
     async def _do(self, work: Coroutine[None, None, None]) -> bool:
         """Run ``work`` as a task that may be cancelled; return False if it was."""

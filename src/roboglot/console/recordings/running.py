@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import errno
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -35,19 +37,20 @@ class Recordings:
 
     @property
     def on(self) -> bool:
-        """True while all robots are being recorded to a file."""
-        return self._recorder().status.on
+        """True while all robots are being recorded to a file; False once that failed."""
+        status = self._recorder().status
+        return status.on and not status.failure
 
     def look(self) -> dict[str, object]:
         """Return the progress; files by name, without their folders."""
         status = self._recorder().status
         return {
-            "on": status.on,
+            "on": self.on,
             "file": Path(status.path).name if status.path else "",
             "seconds": round(status.seconds, 1),
             "bytes": status.bytes,
             "dropped": status.dropped,
-            "failure": status.failure,
+            "failure": _early(status.failure),
         }
 
     async def all(self) -> list[StoredRecording]:
@@ -62,6 +65,8 @@ class Recordings:
     async def do(self, request: RecordingRequest) -> dict[str, object]:
         """Begin, mark or end the recording, or delete another. Raises Refused, NotFound."""
         recorder = self._recorder()
+        if recorder.status.failure and request.do in ("start", "delete"):
+            await recorder.stop()
         match request.do:
             case "start":
                 self._folder.mkdir(parents=True, exist_ok=True)
@@ -69,6 +74,8 @@ class Recordings:
             case "mark":
                 if not request.text.strip():
                     raise Refused("a mark needs text")
+                if recorder.status.failure:
+                    raise Refused(_early(recorder.status.failure))
                 recorder.mark(request.text.strip())
             case "delete":
                 await asyncio.to_thread(self.kept.remove, request.file, self._running)
@@ -76,3 +83,10 @@ class Recordings:
                 ended = await recorder.stop()
                 return self.look() | {"file": Path(ended.path).name, "bytes": ended.bytes}
         return self.look()
+
+
+def _early(failure: str) -> str:
+    """Return why a recording ended early, in words that pages know; empty: it did not."""
+    why = "the disk is full" if failure == os.strerror(errno.ENOSPC) else failure
+    words = f"the recording ended early: {why}"
+    return words if failure else ""

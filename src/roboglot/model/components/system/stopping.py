@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from roboglot.model.components.logistics.delivery import Delivery
 from roboglot.model.components.system.lease import moves
+from roboglot.model.errors import Refused, RobotError
 from roboglot.model.robot import Robot
 
 
 async def stop(robot: Robot, *, reason: str, moving: bool = False) -> None:
     """Cancel all actions, or only those ``moving`` the robot, and hold its orders; return when it stands.
 
-    The next order, or the drive home, would otherwise begin at once. A database that cannot store the hold raises its
-    error after that; the hold then lasts until a restart.
+    The next order, or the drive home, would otherwise begin at once. Raises Refused if the hold cannot be stored, and
+    then lasts until a restart.
     """
     held = Delivery in robot and robot[Delivery].halt()
     if moving:
@@ -23,4 +24,7 @@ async def stop(robot: Robot, *, reason: str, moving: bool = False) -> None:
     else:
         await robot.actions.cancel(reason=reason)
     if held:
-        await robot[Delivery].execute(False)
+        try:
+            await robot[Delivery].execute(False)
+        except RobotError as error:
+            raise Refused(f"it stands, but its orders are held only until a restart: {error}") from error
