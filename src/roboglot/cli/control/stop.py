@@ -15,7 +15,10 @@ def command(
     all_: Annotated[bool, typer.Option("--all", help="Stop all robots at once.")] = False,
     data: Data = None,
 ) -> None:
-    """Stop a robot, or all. Programs and clients may move them again: `roboglot lease` keeps them standing."""
+    """Stop a robot, or all. Programs and clients may move them again: `roboglot lease` keeps them standing.
+
+    Delivery orders wait until *Go on* in the console.
+    """
     if bool(robot) == all_:
         raise typer.BadParameter("name a robot, or give --all")
     answer = send("stop", Request("stop", robot, all=all_), data)
