@@ -31,7 +31,8 @@ class StoredSettings(Settings):
             for write in writes:
                 write(connection)
 
-        await self._database.run(work)
+        fewer = all(_loses_entries(self._values.get(key), value) for key, value in kept.items())
+        await (self._database.remove(work) if fewer else self._database.run(work))
         self._values |= kept
 
     def writing(self, key: str, value: object) -> Callable[[Connection], object]:
@@ -46,3 +47,8 @@ class StoredSettings(Settings):
     def adopt(self, key: str, value: object) -> None:
         """Take over a written value."""
         self._values[key] = json.loads(json.dumps(value))
+
+
+def _loses_entries(old: object, new: object) -> bool:
+    """Return whether a list of settings, as of known devices, loses entries and gains none."""
+    return isinstance(old, list) and isinstance(new, list) and len(new) < len(old) and all(one in old for one in new)
