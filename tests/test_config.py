@@ -80,6 +80,8 @@ def test_address_moves_first_robot_of_a_file(tmp_path: Path) -> None:
     [
         ("worldx = 'office'", r"^/.*\.toml: worldx is not a setting"),
         ("[[robots]]\naddress = '300.1.1.1'", "robot a: 300.1.1.1 is not an address"),
+        ("[[robots]]\naddress = '127.0.0.9:80'", "robot a: 127.0.0.9:80 is not an address"),
+        ("[[robots]]\naddress = '127.0.0.9:1,2'", "robot a: 127.0.0.9:1,2 is not an address"),
         ("address = '127.0.0.5'", r"address is a setting of one robot: it belongs below \[\[robots\]\]"),
         ("[slamware]\nprt = 1", r"slamware\.prt is not a setting"),
         ("[[robots]]\nnamex = 'a'", r"robots\.namex is not a setting"),

@@ -369,7 +369,7 @@ def with_addresses(robots: tuple[RobotConfig, ...]) -> tuple[RobotConfig, ...]:
     filled: list[RobotConfig] = []
     for robot in robots:
         address = robot.address or (str(IPv4Address(filled[-1].address) + 1) if filled else "127.0.0.1")
-        if address.replace(".", "").isdigit() and not is_address(address):
+        if not is_address(address) and (address.replace(".", "").isdigit() or not {*":,/ @"}.isdisjoint(address)):
             raise ValueError(f"robot {robot.name}: {address} is not an address")
         filled.append(dataclasses.replace(robot, address=address))
     kinds = {

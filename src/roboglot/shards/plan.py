@@ -23,6 +23,7 @@ PLAN = "fleet.json"
 RECORDED = ".mcap"
 FILES = {"registry", "people", "certificate", "key", "to", "cloud", "uart", "ca"}  # settings, of sections, too
 NAMES_OR_FILES, SUFFIX = {"world", "body"}, re.compile(r"\.(toml|ya?ml)(\+|$)")
+PORT_MAX = 65535
 NAMES = "abcdefghijklmnopqrstuvwxyz"
 
 
@@ -216,7 +217,7 @@ def _console(template: dict[str, Any], address: str, number: int) -> dict[str, A
     """Return the console's settings, by default at the address of the world's first robot."""
     given = dict(template.get("console", {}))
     if given.get("address") and (port := given.get("port", ConsoleConfig().port)):  # one address: separate ports
-        given["port"] = port + number - 1
+        given["port"] = _port(port, number, "console.port")
     return {"address": address, **given} if is_loopback(address) else {"enabled": False, **given}
 
 
@@ -225,8 +226,15 @@ def _access(given: dict[str, object], data: Path, number: int) -> dict[str, obje
     access = {"people": str(data), **given}
     if gateway := str(given.get("gateway", "")):
         _, port = host_and_port(gateway, "access.gateway")
-        access["gateway"] = f"{gateway.rpartition(':')[0]}:{port + number - 1 if port else 0}"
+        access["gateway"] = f"{gateway.rpartition(':')[0]}:{_port(port, number, 'access.gateway') if port else 0}"
     return access
+
+
+def _port(first: int, number: int, setting: str) -> int:
+    """Return a world's port: each has the one after that of the world before. Raises ValueError beyond the last."""
+    if (port := first + number - 1) > PORT_MAX:
+        raise ValueError(f"{setting} of world w{number} would be {port}: worlds take the ports from {first} on")
+    return port
 
 
 def _addresses(first: str, count: int) -> Iterator[str]:
