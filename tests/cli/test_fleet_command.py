@@ -192,13 +192,22 @@ def test_options_that_a_cluster_ignores_are_refused(tmp_path: Path) -> None:
         fleet.up(worlds=1, first_address=free_addresses(1), memory_max=9, on="local", data=tmp_path)
 
 
-def test_folder_in_use_is_named_before_joining(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Joining a cluster takes up to a minute."""
+@pytest.mark.parametrize("worlds", [None, 1, 2])
+def test_folder_in_use_is_named_first(worlds: int | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Joining a cluster takes up to a minute, and until then there is no plan, or an earlier one."""
+    if worlds == 2:
+        save(plan_fleet(1, 1, {}, tmp_path), tmp_path)
     monkeypatch.setattr(fleet, "_joined", lambda *_: pytest.fail("the cluster was joined"))
     lock = lock_folder(tmp_path)
     with pytest.raises(SystemExit, match=r"^roboglot fleet: another roboglot uses "):
-        fleet.up(worlds=1, first_address=free_addresses(1), on="local", data=tmp_path)
+        fleet.up(worlds=worlds, first_address=free_addresses(1), on="local", data=tmp_path)
     os.close(lock)
+
+
+def test_a_plan_that_is_refused_makes_no_folder(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit, match="yet: give --worlds"):
+        fleet.up(data=tmp_path / "typo")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_detached_shards_are_named_without_a_fleet(tmp_path: Path) -> None:

@@ -8,7 +8,8 @@ import sqlite3
 import sys
 import time
 from collections import deque
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
@@ -76,7 +77,7 @@ def up(
         refuse_without("roboglot fleet", "up", dict.fromkeys(name.partition(".")[0] for name in ("numba", *FOREIGN)))
     began = time.monotonic()
     with launched(wanted=not on) as nursery:  # it loads while we import what a plan needs
-        from roboglot.hosting.folder_lock import FolderInUse, locked
+        from roboglot.hosting.folder_lock import FolderInUse
         from roboglot.hosting.logs import set_up_logging
         from roboglot.shards.serving import Interrupted, serve
 
@@ -84,14 +85,13 @@ def up(
         folder = _folder(data)
         asked = _PlanOptions(worlds, robots_each, template, first_address)
         try:
-            plan = _plan(folder, asked, replan=replan)
             if detached and on in ("", "local"):
                 raise ValueError("--detached is for a cluster: --on ray://HOST")
             if memory_max and on:
                 raise ValueError("--memory-max is for shards without --on: Ray places and limits its own")
             where = _MachineOptions(on, detached, memory_max << 20, nursery)
             say = partial(print, file=sys.stdout, flush=True)  # also where a cluster has it print to standard error
-            with locked(folder), _joined(plan, on):  # joining takes long
+            with _planned(folder, asked, replan=replan) as plan, _joined(plan, on):  # joining takes long
                 asyncio.run(serve(lambda: _fleet_host(plan, folder, where), folder, say, began, lasting=detached))
         except Interrupted as early:
             print(f"roboglot fleet: {early}", file=sys.stderr)
@@ -285,6 +285,23 @@ def _plan(folder: Path, asked: _PlanOptions, *, replan: bool) -> FleetPlan:
     if kept.request != plan.request:
         raise ValueError(f"the fleet in {folder} has another plan: start it without options, or with --replan")
     return kept
+
+
+@contextmanager
+def _planned(folder: Path, asked: _PlanOptions, *, replan: bool) -> Iterator[FleetPlan]:
+    """Context with the plan, in which the folder is locked; one that is not there is made for a good plan only.
+
+    Raises FolderInUse, before what ``_plan`` raises: another program may be storing its plan. Raises OSError.
+    """
+    from roboglot.hosting.folder_lock import locked
+
+    with ExitStack() as held:
+        if there := folder.is_dir():
+            held.enter_context(locked(folder))
+        plan = _plan(folder, asked, replan=replan)
+        if not there:
+            held.enter_context(locked(folder))
+        yield plan
 
 
 class _MachineOptions(NamedTuple):
