@@ -1,4 +1,7 @@
-"""Reads files: text of untrusted sources, raising ValueError with the reason if malformed; and our own data."""
+"""Reads files: text of untrusted sources, raising ValueError with the reason if malformed; and our own data.
+
+Replaces files as a whole.
+"""
 
 from __future__ import annotations
 
@@ -88,6 +91,19 @@ def own_text_of(path: Path, most: int = TEXT_MAX) -> str:
 def tables_in(folder: Path) -> list[Path]:
     """Return the TOML files of a folder, in order; ``own_text_of`` reads those that a wheel stores compressed."""
     return sorted(folder.glob("*.toml")) or sorted(file.with_suffix("") for file in folder.glob("*.toml.gz"))
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield a place beside ``path`` for a file that replaces it once it is whole; one that is not is deleted."""
+    place = Path(os.path.realpath(path))  # a link stays one
+    fresh = place.with_name(f"{place.name}.new")
+    try:
+        yield fresh
+        fresh.replace(place)
+    except BaseException:
+        fresh.unlink(missing_ok=True)
+        raise
 
 
 def bytes_of(path: Path, most: int) -> bytes:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
+
+import httpx
 
 from roboglot.storage.cloud import CloudStore
 from roboglot.storage.database import Database
@@ -26,6 +30,20 @@ async def test_account_is_opened_and_its_token_reported_once(tmp_path: Path) -> 
     kept = database.run_now(lambda c: c.execute("SELECT * FROM cloud_account").fetchall())
     assert ended.stdout.strip() not in str(kept)
     database.close()
+
+
+def test_address_is_printed_once_it_answers(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "roboglot", "cloud", "--data", str(tmp_path / "c.db"), "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        try:
+            line = server.stdout.readline()
+            address = re.fullmatch(r"listening on (http://127\.0\.0\.1:\d+)\n", line)
+            assert address is not None, line
+            assert httpx.get(f"{address[1]}/nothing", timeout=60.0).status_code == 404
+        finally:
+            server.send_signal(signal.SIGINT)
+        assert server.wait(60) == 0
 
 
 def test_mistakes_are_reported_in_one_line(tmp_path: Path) -> None:

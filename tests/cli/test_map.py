@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import httpx
 import numpy as np
@@ -60,6 +63,23 @@ def test_a_written_map_is_read_again(tmp_path: Path) -> None:
     assert (tmp_path / "m.pgm").read_bytes().startswith(b"P5\n3 3\n255\n")
 
 
+def test_map_that_fills_the_disk_leaves_the_old(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_ros_map(GRID, tmp_path / "m.yaml")
+    before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
+    write = Path.write_bytes
+
+    def fail(path: Path, data: bytes) -> int:
+        if "pgm" in path.name:
+            write(path, data[:1])
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return write(path, data)
+
+    monkeypatch.setattr(Path, "write_bytes", fail)
+    with pytest.raises(OSError, match="No space"):
+        write_ros_map(OccupancyGrid(-CELLS, 0.1, Point(0.0, 0.0)), tmp_path / "m.yaml")
+    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
 def test_composite_map_without_a_grid_is_no_map() -> None:
     with pytest.raises(BadMap):
         grid_in(encode_stcm(CompositeMap()))
@@ -75,6 +95,67 @@ async def test_files_there_and_back(tmp_path: Path) -> None:
     code, said = await roboglot("export", str(tmp_path / "x.yaml"), "--file", str(tmp_path / "nothing"))
     assert code == 1
     assert said.startswith("roboglot map:")
+
+
+@pytest.mark.parametrize(
+    ("way", "name", "options", "words"),
+    [
+        (MapOperation.EXPORT, "m.pgm", {}, "ends in .yaml or .yml or .stcm, not 'm.pgm'"),
+        (MapOperation.EXPORT, "noext", {}, "not 'noext'"),
+        (MapOperation.IMPORT, "m.pgm", {}, "not 'm.pgm'"),
+        (MapOperation.IMPORT, "m.yaml", {"file": Path("out.yaml")}, "ends in .stcm, not 'out.yaml'"),
+        (MapOperation.MERGE, "out.yaml", {"floor": ["1F=m.yaml"]}, "ends in .stcm, not 'out.yaml'"),
+        (MapOperation.SURVEY, "office.yaml", {}, "ends in .stcm, not 'office.yaml'"),
+        (MapOperation.IMPORT, "bad.stcm", {}, "bad.stcm: "),
+        (MapOperation.IMPORT, "m.yaml", {"pose": "1,2"}, "a pose is x,y,yaw"),
+        (MapOperation.IMPORT, "m.yaml", {"pose": "1,2,nan"}, "a pose is x,y,yaw"),
+        (MapOperation.IMPORT, "m.yaml", {"pose": "1,2,north"}, "a pose is x,y,yaw"),
+        (MapOperation.EXPORT, "x.yaml", {"robot": "http://a b"}, "'http://a b' is no address"),
+        (MapOperation.EXPORT, "x.yaml", {"robot": f"http://{'a' * 64}.example"}, "is no address"),
+    ],
+)
+def test_mistakes_are_named_and_overwrite_nothing(
+    way: MapOperation,
+    name: str,
+    options: dict[str, Any],
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    write_ros_map(GRID, tmp_path / "m.yaml")
+    (tmp_path / "bad.stcm").write_bytes(encode_stcm(composite_of(FloorMap(grid=GRID)))[:200])
+    before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit, match=re.escape(words)):
+        command(way, Path(name), **options)
+    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
+async def test_port_of_another_door_is_named(tmp_path: Path) -> None:
+    async def greet(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(b"ok;\n")
+        writer.close()
+
+    server = await asyncio.start_server(greet, "127.0.0.1", 0)
+    address = f"http://127.0.0.1:{server.sockets[0].getsockname()[1]}"
+    code, said = await roboglot("export", str(tmp_path / "x.yaml"), "--robot", address)
+    assert code == 1
+    assert said.startswith(f"roboglot map: {address} does not answer as a Slamware door: ")
+    server.close()
+
+
+def test_one_of_several_floors_is_chosen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    other = OccupancyGrid(-CELLS, 0.05, GRID.origin)
+    write_ros_map(GRID, Path("ground.yaml"))
+    write_ros_map(other, Path("first.yaml"))
+    command(MapOperation.MERGE, Path("both.stcm"), floor=["1F=ground.yaml", "2F=first.yaml"])
+    command(MapOperation.EXPORT, Path("up.yaml"), file=Path("both.stcm"), floor=["2F"])
+    assert Path("up.pgm").read_bytes() == Path("first.pgm").read_bytes()
+    for floors, words in ([], "one of 1F, 2F"), (["3F"], "no floor '3F'"), (["1F", "2F"], "one --floor"):
+        with pytest.raises(SystemExit, match=words):
+            command(MapOperation.EXPORT, Path("no.yaml"), file=Path("both.stcm"), floor=floors)
+    assert not Path("no.yaml").exists()
 
 
 @pytest.mark.world("empty")

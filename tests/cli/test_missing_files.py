@@ -57,6 +57,22 @@ def test_missing_file_is_named(words: tuple[str, ...], tmp_path: Path) -> None:
     assert done.stderr.strip() == f"roboglot {words[0]}: no.mcap: No such file or directory"
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("record", "info", ""), "record: .: Is a directory"),
+        (("certs", "--data", "note.txt", "--export", "new"), "certs: note.txt/cyberdog: Not a directory"),
+        (("access", "add", "app", "--data", "data", "--cyberdog", "note.txt"), "access: note.txt: File exists"),
+    ],
+)
+def test_file_instead_of_folder_is_named(words: tuple[str, ...], said: str, tmp_path: Path) -> None:
+    (tmp_path / "note.txt").write_text("mine")
+    command = [sys.executable, "-m", "roboglot", *words]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=180, check=False)
+    assert (done.returncode, done.stderr.strip()) == (1, f"roboglot {said}")
+    assert (tmp_path / "note.txt").read_text() == "mine"
+
+
 def template(path: Path) -> object:
     return _plan(path.parent, _PlanOptions(1, 1, path, ""), replan=True)
 

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
 
-import click
 import pytest
 import typer
 from rich.text import Text
+from typer.core import TyperGroup
 from typer.main import get_command
 
 from roboglot import cli
@@ -51,7 +51,7 @@ def test_reader_that_goes_is_no_error_worth_traceback(words: tuple[str, ...]) ->
 def test_help_shows_words_in_square_brackets(name: str) -> None:
     """Help is markup, in which ``[access]`` is a style and not shown."""
     command = get_command(loaded(name))
-    commands = command.commands.values() if isinstance(command, click.Group) else [command]
+    commands = command.commands.values() if isinstance(command, TyperGroup) else [command]
     texts = [text for each in commands for part in (each, *each.params) if (text := getattr(part, "help", None))]
     assert [Text.from_markup(text).plain for text in texts] == [text.replace("\\[", "[") for text in texts]
 

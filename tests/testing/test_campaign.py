@@ -23,9 +23,10 @@ from hypothesis import strategies as st
 
 from roboglot.cli import campaign
 from roboglot.testing.campaign.report import interval, report
-from roboglot.testing.campaign.table import OtherCampaign, Row, Table, replacing, write_parquet
+from roboglot.testing.campaign.table import OtherCampaign, Row, Table, write_parquet
 from roboglot.testing.campaign.trials import Outcome, Result, Trial, named, trials_of
 from roboglot.testing.scenarios.files import find
+from roboglot.text_files import replacing
 from tests.programs.playing import children_of
 
 SLEEP = f"314.{os.getpid()}"

@@ -18,6 +18,7 @@ from roboglot.access.rights import ALL_ROBOTS, parse_rights, write_rights
 from roboglot.access.store import AccessStore, Grant, IdentityKind, open_store
 from roboglot.cli.suggestions import Group
 from roboglot.config import Config
+from roboglot.hosting.error_text import in_words
 from roboglot.storage.transactions import FAILURES
 
 app = typer.Typer(
@@ -186,4 +187,5 @@ def _store(data: Path | None, database: str) -> Iterator[AccessStore]:
         finally:
             store.close()
     except (ValueError, LookupError, OSError, sqlite3.Error, *FAILURES) as error:
-        sys.exit(f"roboglot access: {error.args[-1] if error.args else error}")
+        words = in_words(error) if isinstance(error, OSError) or not error.args else error.args[-1]
+        sys.exit(f"roboglot access: {words}")

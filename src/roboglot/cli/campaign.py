@@ -142,7 +142,8 @@ def _play(left: list[Trial], table: Table, player: Player) -> bool:
 def _write(table: Table, folder: Path, trials: Sequence[Trial]) -> bool:
     """Write the report on ``trials`` and, if pyarrow is installed, the table for data tools; return if all passed."""
     from roboglot.testing.campaign.report import report
-    from roboglot.testing.campaign.table import replacing, write_parquet
+    from roboglot.testing.campaign.table import write_parquet
+    from roboglot.text_files import replacing
 
     wanted = {(trial.label, trial.seed) for trial in trials}  # the table may hold further ones
     rows = [row for row in table.rows if (row.scenario, row.seed) in wanted]

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from roboglot.config import load_config
+from roboglot.hosting.error_text import in_words
 from roboglot.protocols.cyberdog.certificates import ensure_certificates, export_client
 
 
@@ -18,11 +19,11 @@ def command(
 ) -> None:
     """Write the certificates and key with which a client connects to the robot's gRPC door over mutual TLS."""
     folder = load_config(None, {"data": str(data) if data else None}).data / "cyberdog"
-    ensure_certificates(folder)
     try:
+        ensure_certificates(folder)
         written = export_client(folder, export)
         (export / ".gitignore").write_text("*\n")  # private keys do not belong in a repository
-    except OSError as error:
-        sys.exit(f"roboglot certs: {export} cannot be written: {error.strerror}")
+    except OSError as error:  # BadCertificates, too
+        sys.exit(f"roboglot certs: {in_words(error)}")
     for path in written:
         print(path)

@@ -6,17 +6,12 @@ import asyncio
 import sqlite3
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from roboglot.hosting.error_text import in_words
 from roboglot.hosting.logs import set_up_logging
-
-if TYPE_CHECKING:
-    from roboglot.storage.cloud import CloudStore
-
-CONNECTIONS_MAX = 200
 
 
 def command(
@@ -52,11 +47,17 @@ def command(
         if account:
             print(asyncio.run(store.add_account(account)))
         else:
-            _serve(store, address, port, host or [], verbose)
+            from roboglot.cloud.serving import serve
+
+            serve(store, address, port, host or [], _print_address, verbose=verbose)
     except ValueError as error:
         sys.exit(f"roboglot cloud: {error}")
     finally:
         opened.close()
+
+
+def _print_address(url: str) -> None:
+    print(f"listening on {url}", flush=True)
 
 
 def _warn_if_open(address: str, insecure: bool) -> None:
@@ -75,24 +76,4 @@ def _warn_if_open(address: str, insecure: bool) -> None:
     Console(stderr=True, highlight=False, soft_wrap=True).print(
         f"[bold red]INSECURE[/][red]: anyone on the network of {address} can read the accounts' tokens and"
         " programs, and anyone with a token can change its account[/]"
-    )
-
-
-def _serve(store: CloudStore, address: str, port: int, hosts: list[str], verbose: bool) -> None:
-    import uvicorn
-
-    from roboglot.cloud.application import BackEnd
-    from roboglot.protocols.browsers import Browsers
-    from roboglot.transport.http import BoundedConnection
-
-    uvicorn.run(
-        BackEnd(store, Browsers("", (), hosts)),
-        http=BoundedConnection,
-        ws="none",
-        host=address,
-        port=port,
-        log_config=None,  # as all log lines: without query strings
-        log_level="info" if verbose else "warning",
-        lifespan="off",
-        limit_concurrency=CONNECTIONS_MAX,
     )

@@ -247,7 +247,7 @@ def parts(path: Path) -> Sequence[Path]:
     found, stem, number = [path], path.stem, 2
     if (numbered := re.fullmatch(r"(.+)-(\d{3,})", stem)) and _part_of(path) == numbered[2].lstrip("0") != "1":
         stem, number = numbered[1], int(numbered[2]) + 1  # earlier parts were deleted, or are not wanted
-    while (following := path.with_name(f"{stem}-{number:03}{path.suffix}")).exists():
+    while path.name and (following := path.with_name(f"{stem}-{number:03}{path.suffix}")).exists():
         found.append(following)
         number += 1
     return found

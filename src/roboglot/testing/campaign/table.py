@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import fcntl
 import io
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple, get_type_hints
 
 from roboglot.testing.campaign.trials import FINAL, Outcome, Result, Trial
+from roboglot.text_files import replacing
 
 
 class OtherCampaign(ValueError):
@@ -139,18 +139,6 @@ def _line(values: Sequence[object]) -> bytes:
 def _row(line: Sequence[str]) -> Row:
     scenario, name, seed, outcome, why, seconds, attempts, fingerprint = line
     return Row(scenario, name, int(seed), Outcome(outcome), why, float(seconds), int(attempts), fingerprint)
-
-
-@contextlib.contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """Yield a place beside ``path`` for a file that replaces it once it is whole; one that is not is deleted."""
-    fresh = path.with_name(f"{path.name}.new")
-    try:
-        yield fresh
-        fresh.replace(path)
-    except BaseException:
-        fresh.unlink(missing_ok=True)
-        raise
 
 
 def write_parquet(rows: Sequence[Row], path: Path) -> bool:
