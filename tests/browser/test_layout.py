@@ -98,6 +98,17 @@ async def test_low_screens_show_everything(served: Served, open_console: OpenCon
             assert await page.evaluate(COVERED_OR_CUT) == [], (view, width)
 
 
+async def test_narrowest_phones_reach_every_button(served: Served, open_console: OpenConsole) -> None:
+    page = await open_console(viewport={"width": 320, "height": 568})
+    beyond = """[...document.querySelectorAll('button, a, select, input')].filter((one) => {
+        const { right, width } = one.getBoundingClientRect(); return width && right > innerWidth + 1;
+    }).map((one) => one.textContent)"""
+    for path, shown in (("/#/recordings", "nav .seldom[aria-current]"), ("/studio/", ".start button")):
+        await page.goto(page.url.split("/#")[0] + path)
+        await page.wait_for_selector(shown)
+        assert await page.evaluate(beyond) == [], path
+
+
 async def test_banners_on_low_screens_cover_nothing(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     served.robot[EmergencyStop].engage()
