@@ -104,6 +104,22 @@ def test_mistakes_are_reported_in_a_line(run: Run, words: list[str]) -> None:
     assert "Traceback" not in failed.stderr
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["stand", "--robt", "127.0.0.9"], "there is no option '--robt'; did you mean '--robot'?"),
+        (["stand", "--robt=127.0.0.9"], "there is no option '--robt=127.0.0.9'; did you mean '--robot'?"),
+        (["lie", "-r", "127.0.0.9"], f"there is no option '-r'; there are {', '.join(cyberdog.OPTIONS)}"),
+        (["stand", "127.0.0.9"], "stand takes no words, not '127.0.0.9'"),
+        (["photo", "a.jpg", "127.0.0.9"], "photo takes at most 1 word, not 'a.jpg 127.0.0.9'"),
+    ],
+)
+def test_words_without_effect_move_no_robot(run: Run, words: list[str], said: str) -> None:
+    """A mistyped --robot would move the robot at the default address."""
+    failed = run(*words)
+    assert (failed.returncode, failed.stderr.splitlines()[0]) == (1, f"roboglot cyberdog: {said}")
+
+
 @pytest.mark.slow
 def test_certificates_of_another_robot_are_named(run: Run, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "roboglot", "certs", "--export", str(tmp_path), "--data", str(tmp_path / "other")]

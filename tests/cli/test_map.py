@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,8 @@ import httpx
 import numpy as np
 import pytest
 
-from roboglot.cli.map import MapOperation, command, grid_in, write_ros_map
+from roboglot.cli import map as commands
+from roboglot.cli.map import grid_in, write_ros_map
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.annotations import Annotations
 from roboglot.model.components.mapping.localization import Localization
@@ -98,24 +100,25 @@ async def test_files_there_and_back(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("way", "name", "options", "words"),
+    ("run", "name", "options", "words"),
     [
-        (MapOperation.EXPORT, "m.pgm", {}, "ends in .yaml or .yml or .stcm, not 'm.pgm'"),
-        (MapOperation.EXPORT, "noext", {}, "not 'noext'"),
-        (MapOperation.IMPORT, "m.pgm", {}, "not 'm.pgm'"),
-        (MapOperation.IMPORT, "m.yaml", {"file": Path("out.yaml")}, "ends in .stcm, not 'out.yaml'"),
-        (MapOperation.MERGE, "out.yaml", {"floor": ["1F=m.yaml"]}, "ends in .stcm, not 'out.yaml'"),
-        (MapOperation.SURVEY, "office.yaml", {}, "ends in .stcm, not 'office.yaml'"),
-        (MapOperation.IMPORT, "bad.stcm", {}, "bad.stcm: "),
-        (MapOperation.IMPORT, "m.yaml", {"pose": "1,2"}, "a pose is x,y,yaw"),
-        (MapOperation.IMPORT, "m.yaml", {"pose": "1,2,nan"}, "a pose is x,y,yaw"),
-        (MapOperation.IMPORT, "m.yaml", {"pose": "1,2,north"}, "a pose is x,y,yaw"),
-        (MapOperation.EXPORT, "x.yaml", {"robot": "http://a b"}, "'http://a b' is no address"),
-        (MapOperation.EXPORT, "x.yaml", {"robot": f"http://{'a' * 64}.example"}, "is no address"),
+        (commands.export, "m.pgm", {}, "ends in .yaml or .yml or .stcm, not 'm.pgm'"),
+        (commands.export, "noext", {}, "not 'noext'"),
+        (commands.import_map, "m.pgm", {}, "not 'm.pgm'"),
+        (commands.import_map, "m.yaml", {"file": Path("out.yaml")}, "ends in .stcm, not 'out.yaml'"),
+        (commands.merge, "out.yaml", {"floor": ["1F=m.yaml"]}, "ends in .stcm, not 'out.yaml'"),
+        (commands.survey, "office.yaml", {}, "ends in .stcm, not 'office.yaml'"),
+        (commands.export, "x.stcm", {"floor": "1F"}, "--floor is for ROS maps"),
+        (commands.import_map, "bad.stcm", {}, "bad.stcm: "),
+        (commands.import_map, "m.yaml", {"pose": "1,2"}, "a pose is x,y,yaw"),
+        (commands.import_map, "m.yaml", {"pose": "1,2,nan"}, "a pose is x,y,yaw"),
+        (commands.import_map, "m.yaml", {"pose": "1,2,north"}, "a pose is x,y,yaw"),
+        (commands.export, "x.yaml", {"robot": "http://a b"}, "'http://a b' is no address"),
+        (commands.export, "x.yaml", {"robot": f"http://{'a' * 64}.example"}, "is no address"),
     ],
 )
 def test_mistakes_are_named_and_overwrite_nothing(
-    way: MapOperation,
+    run: Callable[..., None],
     name: str,
     options: dict[str, Any],
     words: str,
@@ -127,7 +130,7 @@ def test_mistakes_are_named_and_overwrite_nothing(
     before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit, match=re.escape(words)):
-        command(way, Path(name), **options)
+        run(Path(name), **options)
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
 
 
@@ -149,12 +152,12 @@ def test_one_of_several_floors_is_chosen(tmp_path: Path, monkeypatch: pytest.Mon
     other = OccupancyGrid(-CELLS, 0.05, GRID.origin)
     write_ros_map(GRID, Path("ground.yaml"))
     write_ros_map(other, Path("first.yaml"))
-    command(MapOperation.MERGE, Path("both.stcm"), floor=["1F=ground.yaml", "2F=first.yaml"])
-    command(MapOperation.EXPORT, Path("up.yaml"), file=Path("both.stcm"), floor=["2F"])
+    commands.merge(Path("both.stcm"), floor=["1F=ground.yaml", "2F=first.yaml"])
+    commands.export(Path("up.yaml"), file=Path("both.stcm"), floor="2F")
     assert Path("up.pgm").read_bytes() == Path("first.pgm").read_bytes()
-    for floors, words in ([], "one of 1F, 2F"), (["3F"], "no floor '3F'"), (["1F", "2F"], "one --floor"):
+    for floor, words in ("", "one of 1F, 2F"), ("3F", "no floor '3F'"):
         with pytest.raises(SystemExit, match=words):
-            command(MapOperation.EXPORT, Path("no.yaml"), file=Path("both.stcm"), floor=floors)
+            commands.export(Path("no.yaml"), file=Path("both.stcm"), floor=floor)
     assert not Path("no.yaml").exists()
 
 
@@ -220,7 +223,7 @@ def test_merged_floors_have_docks_of_their_own(tmp_path: Path, monkeypatch: pyte
     floor = FloorMap(FloorName(), GRID, Annotations(docks=(dock,)))
     (tmp_path / "one.stcm").write_bytes(encode_stcm(composite_of(floor)))
     monkeypatch.chdir(tmp_path)
-    command(MapOperation.MERGE, Path("both.stcm"), floor=["1F=one.stcm", "2F=one.stcm"])
+    commands.merge(Path("both.stcm"), floor=["1F=one.stcm", "2F=one.stcm"])
     below, above = (floor.annotations.docks[0].id for floor in floors_of(decode_stcm(Path("both.stcm").read_bytes())))
     assert below == dock.id
     assert above != below
@@ -242,5 +245,5 @@ def test_failed_merge_is_one_sentence(
     write_ros_map(GRID, tmp_path / "m.yaml")
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit, match=words):
-        command(MapOperation.MERGE, Path("out.stcm"), floor=floors)
+        commands.merge(Path("out.stcm"), floor=floors)
     assert not (tmp_path / "out.stcm").exists()

@@ -26,10 +26,13 @@ from roboglot.clients.errors import ClientError
 from roboglot.config import load_config
 from roboglot.hosting.error_text import in_words
 from roboglot.hosting.escaping import in_line
+from roboglot.spelling import instead
 from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 from roboglot.wire.cyberdog.codes import Feedback
 
 NAMES = ("watch", "status", "stand", "lie", "drive", "map", "go", "charge", "photo", "record", "stop")
+WORDS_MAX = {"drive": 4, "map": 1, "go": 3, "photo": 1, "record": 2}  # other commands take none
+OPTIONS = ("--robot", "--certs", "--data", "--plaintext", "--app-port", "--help")
 UNTRUSTED = "CERTIFICATE_VERIFY_FAILED"  # in gRPC's words
 LINE_PERIOD = 0.5  # s between two lines
 FIRST_MAX = 20.0  # s before a map must begin to grow
@@ -56,6 +59,8 @@ def command(
     """
     if what not in WORK:
         sys.exit(f"roboglot cyberdog: {what!r} is not one of {', '.join(WORK)}")
+    if fault := _fault(what, words or []):
+        sys.exit(f"roboglot cyberdog: {fault}")
     os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # a failed handshake is reported below
     folder = certs or _own(data)
     try:
@@ -68,6 +73,18 @@ def command(
         sys.exit(f"roboglot cyberdog: {_why(in_words(error), robot, folder)}")
     except KeyboardInterrupt:
         sys.exit(130)
+
+
+def _fault(what: str, words: list[str]) -> str:
+    """Return why these are not words of the command: a mistyped --robot must not move another one. "" if they are."""
+    for word in words:
+        if word.startswith("-") and not _is_number(word):
+            return f"there is no option {word!r}{instead(word.partition('=')[0], OPTIONS)}"
+    most = WORDS_MAX.get(what, 0)
+    if len(words) > most:
+        count = "no words" if not most else "at most 1 word" if most == 1 else f"at most {most} words"
+        return f"{what} takes {count}, not {' '.join(words)!r}"
+    return ""
 
 
 def _why(words: str, robot: str, folder: Path) -> str:
@@ -95,6 +112,14 @@ def _numbers(words: list[str], least: int, most: int) -> list[float]:
     if not all(map(math.isfinite, numbers)):
         raise ValueError(f"{' '.join(words)}: not all of these are finite numbers")
     return numbers
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def _print_feedback(code: int) -> None:
@@ -204,13 +229,13 @@ async def _charge(client: CyberDogClient, _: list[str]) -> None:
 
 
 async def _photo(client: CyberDogClient, words: list[str]) -> None:
-    await _receive(_writable(words[:1]), lambda file: client.photo(into=file))
+    await _receive(_writable(words), lambda file: client.photo(into=file))
 
 
 async def _record(client: CyberDogClient, words: list[str]) -> None:
     (seconds,) = _numbers(words[:1], 1, 1)
     _check_seconds(seconds)
-    name = _writable(words[1:2])
+    name = _writable(words[1:])
     await client.found()  # a dog still looking for its previous app would end the recording
     await client.record()
     await client.clock.sleep(seconds)

@@ -7,7 +7,8 @@ import math
 import sys
 import urllib.error
 import urllib.request
-from enum import StrEnum
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +19,7 @@ from msgspec.structs import astuple
 from roboglot.cli.maps.merge import merged
 from roboglot.cli.maps.ros_map import write_ros_map
 from roboglot.cli.maps.survey import RADIUS, first_pose, surveyed
+from roboglot.cli.suggestions import Group
 from roboglot.hosting.error_text import in_words
 from roboglot.model.maps import OccupancyGrid
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, composite_of, floors_of
@@ -32,91 +34,117 @@ STCM = "/api/core/slam/v1/maps/stcm"
 SAVED = "/api/multi-floor/map/v1/stcm"
 
 
-class MapOperation(StrEnum):
-    """Direction: to or from a robot or file, from a log, several floors to one, or a world's floors to one."""
+app = typer.Typer(
+    cls=Group,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Give a robot a map, write its map to a file, build one from a log, merge floors, or survey a world.",
+)
+Robot = Annotated[str, typer.Option(help="The robot's Slamware address.")]
+Composite = Annotated[Path | None, typer.Option(help="A composite map (.stcm) instead of a robot.")]
+Target = Annotated[Path, typer.Argument(metavar="MAP", help="The new map (.stcm).")]
+SLAMWARE = "http://127.0.0.1:1448"
 
-    IMPORT = "import"
-    EXPORT = "export"
-    BUILD = "build"
-    MERGE = "merge"
-    SURVEY = "survey"
 
-
-def command(
-    way: Annotated[
-        MapOperation,
-        typer.Argument(
-            help="import MAP, export to it, build from it (a log), merge floors into it, or survey a world."
-        ),
-    ],
-    ros_map: Annotated[
-        Path, typer.Argument(metavar="MAP", help="A ROS map's yaml file with its image beside it, a .stcm, or a log.")
-    ],
-    robot: Annotated[str, typer.Option(help="The robot's Slamware address.")] = "http://127.0.0.1:1448",
-    file: Annotated[Path | None, typer.Option(help="A composite map (.stcm) instead of a robot.")] = None,
-    out: Annotated[Path, typer.Option(help="build: the folder for map, trajectory and report.")] = Path("map"),
-    relations: Annotated[Path | None, typer.Option(help="build: a relations file to measure against.")] = None,
-    pose: Annotated[str, typer.Option(help="Where the robot is in an imported map: x,y,yaw in m and rad.")] = "",
-    floor: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=SOURCE",
-            help="For merge, lowest first: a .stcm, a ROS map (.yaml) or a robot's http:// address."
-            " For export to a ROS map: the NAME of one floor of several.",
-        ),
-    ] = None,
-    building: Annotated[str, typer.Option(help="For merge: the building's name.")] = "",
-    world: Annotated[str, typer.Option(help="For survey: the world whose floors are drawn.")] = "office",
-) -> None:
-    """Give a robot a map, write its map to a file, build one from a log, or merge the maps of several floors."""
-    floors = floor or []
+@contextmanager
+def _one_line() -> Iterator[None]:
+    """Context whose errors end the program with one line."""
     try:
-        match way:
-            case MapOperation.BUILD:
-                from roboglot.cli.maps.build import build  # it needs the kernels
-
-                build(ros_map, out, relations)
-            case MapOperation.MERGE:
-                _check_name(ros_map, COMPOSITE)
-                _write(ros_map, merged(floors, building, lambda address: _call(address, "GET", STCM)))
-                print(f"{', '.join(floors)} -> {ros_map}")
-            case MapOperation.SURVEY:
-                _survey(world, ros_map)
-            case MapOperation.IMPORT:
-                _import(ros_map, robot, file, pose)
-            case MapOperation.EXPORT:
-                _export(robot, file, ros_map, floors)
+        yield
     except (ValueError, OSError) as error:  # BadMap, BadFile and the like carry plain messages
         sys.exit(f"roboglot map: {in_words(error)}")
 
 
-def _survey(world: str, target: Path) -> None:
-    _check_name(target, COMPOSITE)
-    description = load_world(world)
-    _write(target, surveyed(description))
-    pose = ",".join(f"{value:.3f}" for value in astuple(first_pose(description, RADIUS)))
-    print(f"{world} -> {target}; its first robot wakes up there at --pose {pose}")
+@app.command(name="import")
+def import_map(
+    source: Annotated[
+        Path, typer.Argument(metavar="MAP", help="A ROS map's yaml file with its image beside it, or a .stcm.")
+    ],
+    robot: Robot = SLAMWARE,
+    file: Composite = None,
+    pose: Annotated[str, typer.Option(help="Where the robot is in the map: x,y,yaw in m and rad.")] = "",
+) -> None:
+    """Give a robot a map, or write it to a composite map."""
+    with _one_line():
+        numbers = _numbers(pose) if pose else []
+        if file:
+            _check_name(file, COMPOSITE)
+        data = _read(source)
+        if file:
+            _write(file, data)
+        else:
+            _give(robot, data, numbers)
+        print(f"{source} -> {file or robot}")
 
 
-def _import(source: Path, robot: str, file: Path | None, pose: str) -> None:
-    if file:
-        _check_name(file, COMPOSITE)
-    data = _read(source)
-    if file:
-        _write(file, data)
-    else:
-        _give(robot, data, pose)
-    print(f"{source} -> {file or robot}")
+@app.command()
+def export(
+    target: Annotated[
+        Path, typer.Argument(metavar="MAP", help="The new ROS map (.yaml; its image is put beside it), or a .stcm.")
+    ],
+    robot: Robot = SLAMWARE,
+    file: Composite = None,
+    floor: Annotated[str, typer.Option(help="Name of the floor, if the map has several: a ROS map has one.")] = "",
+) -> None:
+    """Write a robot's map, or a composite map, to a file."""
+    with _one_line():
+        _check_name(target, ROS + COMPOSITE)
+        if floor and target.suffix in COMPOSITE:
+            raise ValueError("--floor is for ROS maps: a .stcm holds all floors")
+        data = bytes_of(file, MAP_BYTES_MAX) if file else _call(robot, "GET", STCM)
+        if target.suffix in COMPOSITE:
+            _write(target, data)
+        else:
+            write_ros_map(grid_in(data, floor), target)
+        print(f"{file or robot} -> {target}")
 
 
-def _export(robot: str, file: Path | None, target: Path, floors: list[str]) -> None:
-    _check_name(target, ROS + COMPOSITE)
-    data = bytes_of(file, MAP_BYTES_MAX) if file else _call(robot, "GET", STCM)
-    if target.suffix in COMPOSITE:
-        _write(target, data)
-    else:
-        write_ros_map(grid_in(data, *floors), target)
-    print(f"{file or robot} -> {target}")
+@app.command()
+def build(
+    log: Annotated[Path, typer.Argument(help="The log of a drive: CARMEN, a bag of ROS, or our own recording.")],
+    out: Annotated[Path, typer.Option(help="The folder for map, trajectory and report.")] = Path("map"),
+    relations: Annotated[Path | None, typer.Option(help="A relations file to measure against.")] = None,
+) -> None:
+    """Build a map from a recorded drive."""
+    from roboglot.cli.maps.build import build as build_map  # it needs the kernels
+
+    with _one_line():
+        build_map(log, out, relations)
+
+
+@app.command()
+def merge(
+    target: Target,
+    floor: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=SOURCE",
+            help="A floor, the lowest first; its source is a .stcm, a ROS map (.yaml) or a robot's http:// address.",
+        ),
+    ] = None,
+    building: Annotated[str, typer.Option(help="The building's name.")] = "",
+) -> None:
+    """Merge the maps of several floors."""
+    floors = floor or []
+    with _one_line():
+        _check_name(target, COMPOSITE)
+        _write(target, merged(floors, building, lambda address: _call(address, "GET", STCM)))
+        print(f"{', '.join(floors)} -> {target}")
+
+
+@app.command()
+def survey(
+    target: Target,
+    world: Annotated[str, typer.Option(help="The world whose floors are drawn.")] = "office",
+) -> None:
+    """Draw a map of a world's floors."""
+    with _one_line():
+        _check_name(target, COMPOSITE)
+        description = load_world(world)
+        _write(target, surveyed(description))
+        pose = ",".join(f"{value:.3f}" for value in astuple(first_pose(description, RADIUS)))
+        print(f"{world} -> {target}; its first robot wakes up there at --pose {pose}")
 
 
 def _check_name(path: Path, ends: tuple[str, ...]) -> None:
@@ -143,28 +171,24 @@ def _read(path: Path) -> bytes:
     return data
 
 
-def grid_in(data: bytes, *names: str) -> OccupancyGrid:
+def grid_in(data: bytes, name: str = "") -> OccupancyGrid:
     """Return the only grid in a composite map, or that of the floor of this name. Raises BadMap, ValueError."""
-    if len(names) > 1:
-        raise ValueError("a ROS map has one floor: give one --floor")
     grids = [(floor.name.floor, floor.grid) for floor in floors_of(decode_stcm(data)) if floor.grid is not None]
-    grids = [(name, grid) for name, grid in grids if grid.width]
+    grids = [(floor, grid) for floor, grid in grids if grid.width]
     if not grids:
         raise BadMap("the map is empty")
-    there = ", ".join(name for name, _ in grids)
-    found = [grid for name, grid in grids if name in names] if names else [grid for _, grid in grids]
-    if names and not found:
-        raise ValueError(f"the map has no floor {names[0]!r}; there are: {there}")
+    there = ", ".join(floor for floor, _ in grids)
+    found = [grid for floor, grid in grids if name in ("", floor)]
+    if not found:
+        raise ValueError(f"the map has no floor {name!r}; there are: {there}")
     if len(found) > 1:
         raise ValueError(f"the map has several floors: give --floor with one of {there}")
     return found[0]
 
 
-def _give(robot: str, data: bytes, pose: str) -> None:
-    """Save the map on the robot and load it."""
-    body = b""
-    if pose:
-        body = msgspec.json.encode({"pose": dict(zip(("x", "y", "yaw"), _numbers(pose), strict=True))})
+def _give(robot: str, data: bytes, pose: list[float]) -> None:
+    """Save the map on the robot and load it; ``pose`` is empty, or x and y (m) and yaw (rad)."""
+    body = msgspec.json.encode({"pose": dict(zip(("x", "y", "yaw"), pose, strict=True))}) if pose else b""
     _call(robot, "POST", SAVED, data)
     _call(robot, "POST", f"{SAVED}/:reload", body)
 
