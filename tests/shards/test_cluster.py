@@ -33,7 +33,6 @@ from roboglot.shards.joining import joined
 from roboglot.shards.messages import Beat, Ready, Refusal
 from roboglot.shards.plan import plan_fleet
 from roboglot.shards.ray_processes import RayProcesses
-from roboglot.shards.spare import become_spare
 from roboglot.shards.states import State, detached_on
 from roboglot.storage.opening import open_registry
 from roboglot.storage.robot_registry import Claim, RobotRegistry
@@ -164,17 +163,13 @@ class FakeRay(SimpleNamespace):
         super().__init__(names=list(names), util=SimpleNamespace(list_named_actors=lambda: list(self.names)))
         self.failure: Exception | None = None
         self.refusal: Refusal | None = None
-        self.looks = self.spares = 0
+        self.looks = 0
 
-    def remote(self, what: object) -> SimpleNamespace:
-        return SimpleNamespace(options=self._task if what is become_spare else self._options)
+    def remote(self, _: type) -> FakeRay:
+        return self
 
-    def _options(self, *, name: str, **_: object) -> SimpleNamespace:
+    def options(self, *, name: str, **_: object) -> SimpleNamespace:
         return SimpleNamespace(remote=lambda *_, **__: self.get_actor(name))
-
-    def _task(self, **_: object) -> SimpleNamespace:
-        self.spares += 1
-        return SimpleNamespace(remote=lambda: SimpleNamespace(future=Future[None]))
 
     def get_actor(self, name: str) -> SimpleNamespace:
         if name not in self.names:
@@ -247,28 +242,6 @@ async def test_a_shard_that_cannot_start_is_logged_once(
             await asyncio.sleep(0.001)
     assert (fleet.shards["w1"].state, fleet.shards["w1"].hopeless) == (State.FAILED, True)
     assert caplog.messages == ["shard w1 did not start: no body is named 'herms'"]
-    await fleet.close()
-
-
-@pytest.mark.parametrize(("where", "each"), [("local", 1), ("ray://head", 0)])
-async def test_a_spare_process_follows_each_restart(
-    where: str, each: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The next shard that dies starts in it; where Ray is not ours, it would end the process after a second."""
-    fake = FakeRay()
-    monkeypatch.setattr(cluster_module, "ray", fake)
-    monkeypatch.setattr(cluster_module, "PERIOD", 0.001)
-    fleet = ClusterFleet(plan_fleet(3, 1, {}, tmp_path), tmp_path, where)
-    await fleet.start()
-    assert fake.spares == each  # not one for each shard
-    shard = fleet.shards["w2"]
-    await fleet.restart(shard)
-    assert fake.spares == 2 * each
-    seen = fake.looks
-    async with asyncio.timeout(PATIENCE):
-        while fake.looks < seen + 10:  # noqa: ASYNC110 - there is no event of it
-            await asyncio.sleep(0.001)
-    assert fake.spares == 2 * each
     await fleet.close()
 
 

@@ -24,7 +24,6 @@ from roboglot.shards.joining import LOCAL, NAMESPACE
 from roboglot.shards.messages import Beat
 from roboglot.shards.plan import FleetPlan, ShardPlan, save
 from roboglot.shards.ray_processes import RayProcesses
-from roboglot.shards.spare import become_spare
 from roboglot.shards.states import DETACHED, LOG_FILE, Shard, Shards, State, detached_on, rotate
 from roboglot.storage.dead_programs import DeadProgramWatch
 from roboglot.storage.opening import open_registry
@@ -257,15 +256,7 @@ class ClusterFleet:
             shard.reason = ""
         if state is not shard.state:
             self.shards.turn_to(shard, state)
-            if self._local and state is State.READY and all(one.is_settled for one in self.shards.values()):
-                _prepare_spare()
         _keep(shard.folder / LOG_FILE, condition.lines)  # last, as the disk may be full
-
-
-def _prepare_spare() -> None:
-    """Have Ray prepare a spare process, unless it still has the last one; does not wait for it."""
-    task = ray.remote(become_spare).options(num_cpus=0, max_retries=0).remote().future()
-    task.add_done_callback(lambda ended: ended.cancelled() or ended.exception())  # else Ray would print its failure
 
 
 @contextmanager

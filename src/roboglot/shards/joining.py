@@ -18,7 +18,6 @@ from roboglot.shards.ray_processes import children, end_children
 
 TOKENS = "RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"
 NICENESS = "RAY_worker_niceness"
-IDLE_MAX = "RAY_idle_worker_killing_time_threshold_ms"  # after which Ray ends a process that waits for work
 
 
 def own_token(environment: Mapping[str, str], home: Path) -> bool:
@@ -39,7 +38,6 @@ PORT_MAX = 65535
 PROBE_MAX = 5.0  # s
 CLIENT_PORT = 10001  # default port of ray://HOST
 STORE_BYTES = 80 << 20  # of a cluster that we start: actors share no objects
-FOREVER = 10 * 365 * 86_400_000  # ms
 STARTS_MAX = 3  # of Ray on this machine
 GIVEN_UP = "timed out during startup"  # in Ray's error
 TOO_SLOW = "because its agents were not up within 15 s"
@@ -85,7 +83,6 @@ def _start_here() -> None:
     """
     # Ray's own 15 gives its processes hardly any time beside others: a killed shard was away for minutes.
     os.environ.setdefault(NICENESS, str(os.getpriority(os.PRIO_PROCESS, 0)))
-    os.environ.setdefault(IDLE_MAX, str(FOREVER))  # for the spare process
     before = children()
     for start in range(1, STARTS_MAX + 1):
         try:

@@ -58,19 +58,8 @@ class Threaded(RuntimeError):
 
 def warm() -> None:
     """Load everything, then freeze it, so that garbage collection copies no shared pages. Raises Threaded."""
-    from roboglot.values import make_initialisers
-
     _compile()
     gc.disable()
-    load()
-    make_initialisers()
-    gc.freeze()  # with the garbage: finding its few thousand objects would take a tenth of the time
-    gc.enable()
-    refuse_threads()
-
-
-def load() -> None:
-    """Import everything, load the kernels and fill the caches of a world's start."""
     for name in modules_of(PACKAGES):
         try:
             importlib.import_module(name)
@@ -80,11 +69,16 @@ def load() -> None:
     for name in FOREIGN:
         importlib.import_module(name)
     from roboglot.kernels import MODULES, loading
+    from roboglot.values import make_initialisers
 
     with loading():
         for name in MODULES:
             importlib.import_module(f"roboglot.kernels.{name}")
     _rehearse()
+    make_initialisers()
+    gc.freeze()  # with the garbage: finding its few thousand objects would take a tenth of the time
+    gc.enable()
+    refuse_threads()
 
 
 def _compile() -> None:
