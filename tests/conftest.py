@@ -12,6 +12,7 @@ import importlib
 import importlib.util
 import inspect
 import itertools
+import logging
 import os
 import re
 import signal
@@ -255,6 +256,17 @@ TURN = 180.0  # real s for other tests, of the 240 that a test may take
 STRANGERS = 60.0  # real s for clients of other programs
 PAUSE = 0.1  # real s between two looks
 _strangers_stay: list[str] = []  # for whose sake tests were skipped: later ones wait 1 s
+
+
+@pytest.fixture
+def caplog(caplog: pytest.LogCaptureFixture) -> pytest.LogCaptureFixture:
+    """Log of the test, without what robots that other tests keep in a thread log meanwhile, as of a slow machine."""
+    caplog.handler.addFilter(_is_of_this_test)
+    return caplog
+
+
+def _is_of_this_test(record: logging.LogRecord) -> bool:
+    return record.threadName != "roboglot"  # see roboglot.testing.server
 
 
 @pytest.fixture
