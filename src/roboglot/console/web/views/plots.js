@@ -80,7 +80,7 @@ function Plot({ name, unit, range }) {
     let plot = null, stop = () => {}, gone = false;
     const watcher = new ResizeObserver(() => { if (place.current) plot?.setSize({ width: place.current.clientWidth, height: HEIGHT }); });
     plotting().then((uPlot) => {
-      if (gone) return;
+      if (gone || !place.current) return; // closed while it was loading
       plot = made(uPlot, place.current, name, range);
       watcher.observe(place.current);
       stop = effect(() => { void drawn.value; void current.value; plot.setData(columns(name)); });
