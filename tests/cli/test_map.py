@@ -111,6 +111,7 @@ async def test_files_there_and_back(tmp_path: Path) -> None:
         (commands.export, "x.stcm", {"floor": "1F"}, "--floor is for ROS maps"),
         (commands.import_map, "bad.stcm", {}, "bad.stcm: "),
         (commands.import_map, "m.yaml", {"pose": "1,2"}, "a pose is x,y,yaw"),
+        (commands.import_map, "m.yaml", {"pose": "1,2,0", "file": Path("out.stcm")}, "--pose is for robots"),
         (commands.import_map, "m.yaml", {"pose": "1,2,nan"}, "a pose is x,y,yaw"),
         (commands.import_map, "m.yaml", {"pose": "1,2,north"}, "a pose is x,y,yaw"),
         (commands.export, "x.yaml", {"robot": "http://a b"}, "'http://a b' is no address"),

@@ -33,7 +33,6 @@ COMPOSITE, ROS = (".stcm",), (".yaml", ".yml")  # the ends of the files' names
 STCM = "/api/core/slam/v1/maps/stcm"
 SAVED = "/api/multi-floor/map/v1/stcm"
 
-
 app = typer.Typer(
     cls=Group,
     no_args_is_help=True,
@@ -70,6 +69,8 @@ def import_map(
         numbers = _numbers(pose) if pose else []
         if file:
             _check_name(file, COMPOSITE)
+            if pose:
+                raise ValueError("--pose is for robots: a file keeps none")
         data = _read(source)
         if file:
             _write(file, data)
