@@ -33,7 +33,8 @@ from hypothesis.internal.entropy import deterministic_PRNG
 from roboglot.cli.warm import installation
 from roboglot.hosting import closing
 from roboglot.storage.settings import StoredSettings
-from tests import warm_start
+from tests.workers import warm_start
+from tests.workers.scheduling import pytest_xdist_make_scheduler  # noqa: F401 - a hook
 
 if TYPE_CHECKING:
     from tests.storage.postgresql_server import PostgreSQLServer
@@ -84,6 +85,7 @@ PROCESSES = (
     "drivers",
     "end_to_end",
     "shards",
+    "workers",
 )  # folders that contain some
 LONGEST = (  # for a worker: what starts browsers, environments and campaigns; begun late, they would run on alone
     "tests/browser/",
@@ -187,30 +189,6 @@ def _traits_of(source: str) -> set[str]:
 @functools.cache
 def _text(path: Path) -> str:
     return path.read_text(encoding="utf-8")
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:
-    """Share tests out by files, but have one worker start the browser, one PostgreSQL, and one parse all sources."""
-    from xdist.scheduler import LoadFileScheduling
-
-    class OneWorker(LoadFileScheduling):
-        def _split_scope(self, nodeid: str) -> str:
-            return _companion_of(nodeid.partition("::")[0]) or super()._split_scope(nodeid)
-
-    return OneWorker(config, log) if config.getoption("dist") == "loadfile" else None
-
-
-@functools.cache
-def _companion_of(file: str) -> str:
-    """Return the folder whose server a file of tests needs, or the file whose syntax trees; or ""."""
-    if file == "tests/console/test_server_words.py":
-        return "tests/test_house.py"
-    for folder in ("tests/browser", "tests/storage"):
-        if file.startswith(f"{folder}/"):
-            return folder
-    path = TESTS.parent / file
-    return "tests/storage" if path.is_file() and "db_server" in _text(path) else ""
 
 
 def pytest_collection_finish() -> None:

@@ -15,7 +15,7 @@ import pytest
 from roboglot.__main__ import _start_warm
 from roboglot.cli.warm import command, installation
 from roboglot.cli.warm.installation import socket_path
-from tests.warm_start import COLD
+from tests.workers.warm_start import COLD
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks of a warm parent are there on Linux only")
 

@@ -28,7 +28,7 @@ from roboglot.programs.engine.events import (
     Output,
 )
 from tests.programs.playing import PRELUDE, Played, open_descriptors, play, process_state
-from tests.warm_start import COLD
+from tests.workers.warm_start import COLD
 
 # They use up twenty seconds of processor time at the lowest priority: minutes on a busy machine.
 pytestmark = pytest.mark.timeout(380)

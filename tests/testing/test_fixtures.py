@@ -13,7 +13,7 @@ import pytest
 import roboglot.fleet
 from roboglot.model.geometry import Pose
 from roboglot.testing import assert_pose
-from tests.warm_start import COLD
+from tests.workers.warm_start import COLD
 
 START = Path(__file__).parents[2] / "docs/start.md"
 

@@ -85,7 +85,8 @@ def pytest_xdist_setupnodes(specs: list[object]) -> None:
     python = shlex.join([sys.executable, "-m", command.__name__])
     for number, spec in enumerate(specs):
         if getattr(spec, "popen", None) and not getattr(spec, "python", None):
-            specs[number] = execnet.XSpec(f"{spec}//python={python}")
+            specs[number] = warm = execnet.XSpec(f"{spec}//python={python}")
+            warm.id = getattr(spec, "id", None)
 
 
 @pytest.fixture

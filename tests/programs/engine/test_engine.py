@@ -26,7 +26,7 @@ from roboglot.programs.engine.events import (
 from roboglot.programs.engine.processor_group import ProcessorGroup
 from roboglot.programs.worker import zygote
 from tests.programs.playing import PRELUDE, children_of, open_descriptors, play, process_state, until
-from tests.warm_start import COLD
+from tests.workers.warm_start import COLD
 
 BUSY = "print('ready')\nwhile True: pass"
 

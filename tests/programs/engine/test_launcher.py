@@ -16,7 +16,7 @@ import pytest
 from roboglot.programs.engine import launcher
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.launcher import Launcher
-from tests.warm_start import COLD, SOURCES
+from tests.workers.warm_start import COLD, SOURCES
 
 # What a zygote starts with, in place of what it would do. socket.recv_fds, by which the warm one is asked, imports
 # array; a newer libffi keeps its own file open, and the warm one has closed it.

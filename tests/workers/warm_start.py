@@ -52,8 +52,9 @@ PLAIN = {
 OF_THE_INTERPRETER = ("PYTHON", "LC_", "LANG", "NUMBA_", "OPENBLAS_", "OMP_", "MKL_", "GRPC_", "LD_", "MALLOC_")
 ZYGOTE = "from roboglot.programs.worker import zygote\nzygote.main("  # in its code
 PR_SET_CHILD_SUBREAPER = 36
+PATIENCE = 120.0  # real s for a child; the first one waits for all imports
 
-SOURCES = str(Path(__file__).parents[1] / "src")
+SOURCES = str(Path(__file__).parents[2] / "src")
 ZYGOTES = {"PYTHONHASHSEED": "0"}  # the environment
 
 _execute_cold: Any = subprocess.Popen._execute_child  # type: ignore[attr-defined]
@@ -72,15 +73,17 @@ class WarmParent:
         """Return the process id of a new child. Raises OSError."""
         with self._lock:
             line = self._line or self._open()
-            self._line = line
+            line.settimeout(PATIENCE)
+            self._line = None  # after a failure, the next child comes from another process
             self._libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)  # its parent ends at once: we adopt it
             try:
                 socket.send_fds(line, [json.dumps(wish).encode()], descriptors)
                 answer = line.recv(64)
             finally:
                 self._libc.prctl(PR_SET_CHILD_SUBREAPER, 0, 0, 0, 0)
-        if not answer:
-            raise OSError("the process that forks has died")
+            if not answer:
+                raise OSError("the process that forks has died")
+            self._line = line
         return int(answer)
 
     def _open(self) -> socket.socket:
@@ -92,7 +95,7 @@ class WarmParent:
                 [sys.executable, "-m", __name__, str(its.fileno())],
                 pass_fds=[its.fileno()],
                 stdin=subprocess.DEVNULL,
-                cwd=Path(__file__).parents[1],
+                cwd=Path(__file__).parents[2],
                 # Forks have a hash seed other than ours: a rerun of what we recorded must not depend on it.
                 env={**os.environ, **ENVIRONMENT, "PYTHONHASHSEED": "random"},
             ).returncode = 0  # it ends with our socket; no need to wait for it
@@ -306,4 +309,4 @@ def main(descriptor: int) -> None:
 
 
 if __name__ == "__main__":
-    importlib.import_module("tests.warm_start").main(int(sys.argv[1]))  # the module that a worker imports
+    importlib.import_module("tests.workers.warm_start").main(int(sys.argv[1]))  # the module that a worker imports
