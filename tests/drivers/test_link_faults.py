@@ -222,7 +222,8 @@ async def test_moves_of_late_ep_arrive_at_full_speed(
             await until(driven.clock, partial(lambda action: action.status.ended, action), 10)
             assert action.status is ActionStatus.SUCCEEDED, action.reason
             here = world.truth.pose_of("a").relative_to(start)
-            assert_pose(here, x=offset.x, y=offset.y, deg=math.degrees(offset.yaw), within=0.02)
+            # What a busy machine delivers a step (0.02 s) late is 0.02 m and 2.3 degrees at full speed.
+            assert_pose(here, x=offset.x, y=offset.y, deg=math.degrees(offset.yaw), within=0.03, within_deg=4)
 
 
 @pytest.mark.parametrize("back", DOG_LATER)
