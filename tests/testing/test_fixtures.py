@@ -8,11 +8,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import execnet
 import pytest
 
 import roboglot.fleet
+from roboglot.cli.warm import installation
 from roboglot.model.geometry import Pose
 from roboglot.testing import assert_pose
+from roboglot.testing.plugin import pytest_xdist_setupnodes
 from tests.workers.warm_start import COLD
 
 START = Path(__file__).parents[2] / "docs/start.md"
@@ -31,6 +34,18 @@ def test_start_pages_example_passes_in_an_empty_folder(tmp_path: Path) -> None:
 def test_pytest_does_not_rewrite_the_asserts_of_roboglot() -> None:
     assert type(roboglot.fleet.__loader__).__module__ != "_pytest.assertion.rewrite"
     assert type(sys.modules[__name__].__loader__).__module__ == "_pytest.assertion.rewrite"
+
+
+def test_workers_that_start_warm_keep_their_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    """xdist named them anew, and spoke of twice as many."""
+    monkeypatch.setenv(installation.WARM, "1")
+    given = execnet.XSpec("popen")
+    given.id = "gw0"
+    specs: list[object] = [given]
+    pytest_xdist_setupnodes(specs)
+    [warm] = specs
+    assert isinstance(warm, execnet.XSpec)
+    assert (warm.id, warm.popen, "roboglot.cli.warm" in str(warm.python)) == ("gw0", True, True)
 
 
 def test_a_pose_that_is_off_is_reported() -> None:
