@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Collection, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -16,6 +17,7 @@ import msgspec
 from roboglot.hosting.local_socket import LocalServer
 from roboglot.model.components.system.lease import PERSON, Lease
 from roboglot.model.components.system.link import Link
+from roboglot.model.components.system.resetting import reset
 from roboglot.model.components.system.stopping import stop
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
@@ -110,9 +112,8 @@ class LeaseServer(LocalServer):
             case "reset":
                 if self._stage is None or robot.id not in {placed.name for placed in self._stage.robots}:
                     raise LookupError(f"robot {robot.id} is in no simulated world")
-                self._stage.refuse_reset(robot.id)
-                await robot.actions.cancel(reason="reset by the owner of this machine")
-                self._stage.reset(robot.id)
+                end = partial(robot.actions.cancel, reason="reset by the owner of this machine")
+                await reset(robot, self._stage, end)
             case _:
                 await robot[Lease].take(PERSON)
 

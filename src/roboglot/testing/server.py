@@ -227,7 +227,7 @@ class RobotServer:
             stage.remove_obstacle(box.number)
         for person in stage.people:
             stage.person(person.name).resume()
-        self._ways.put_back()
+        await self._ways.put_back()
 
     def prepare(self, wanted: Wanted) -> None:
         """Prepare this server for another test: reset it, then inject that test's faults."""

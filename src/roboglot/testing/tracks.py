@@ -59,13 +59,14 @@ class Ways:
         """Begin to record tracks."""
         self._tracking = asyncio.ensure_future(self._track())
 
-    def put_back(self) -> None:
+    async def put_back(self) -> None:
         """Return the robots to their start poses, charge and pose estimates."""
         from roboglot.model.components.mapping.localization import Localization
+        from roboglot.model.components.system.resetting import reset
 
         for name, robot in self._fleet.robots.items():
             if name in self.origins:
-                self._fleet.world.stage.reset(name)
+                await reset(robot, self._fleet.world.stage, robot.actions.cancel)
             if name in self._starts:
                 robot[Localization].set_pose(self._starts[name])
 

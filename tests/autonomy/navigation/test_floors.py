@@ -8,7 +8,6 @@ from collections.abc import AsyncIterator
 from dataclasses import replace
 from typing import Any, TypedDict
 
-import numpy as np
 import pytest
 from msgspec import structs
 
@@ -35,10 +34,10 @@ from roboglot.model.components.system.file_store import FileStore
 from roboglot.model.errors import Blocked, InvalidGoal, Refused
 from roboglot.model.events import ActionChanged, FloorReached, MapReplaced
 from roboglot.model.geometry import Point, Pose
-from roboglot.model.maps import OccupancyGrid
 from roboglot.simulation.components.sensing.lidar import SimulatedLidar
 from tests.autonomy.conftest import Tour
 from tests.autonomy.delivery_robot import delivery_robot
+from tests.autonomy.lift_rides import agreement, quick_lift, say_where_the_lift_is
 from tests.narrowing import known
 
 
@@ -46,21 +45,6 @@ from tests.narrowing import known
 async def fleet(clock: LockstepClock) -> AsyncIterator[Fleet]:
     async with delivery_robot(clock) as built:
         yield built
-
-
-def say_where_the_lift_is(tour: Tour) -> None:
-    waiting, inside = (Pose(x, 10.0, math.pi).relative_to(tour.start) for x in (2.7, 1.0))
-    tour.robot[Floors].set_lift(waiting, inside)
-
-
-def agreement(earlier: OccupancyGrid, later: OccupancyGrid) -> float:
-    """Return the share of cells known earlier that are shown alike, place by place; a map may grow meanwhile."""
-    known = np.argwhere(earlier.log_odds != 0)
-    shift = np.array((earlier.origin.y - later.origin.y, earlier.origin.x - later.origin.x)) / later.resolution
-    moved = known + np.rint(shift).astype(int)
-    within = ((moved >= 0) & (moved < later.log_odds.shape)).all(axis=1)
-    before, after = earlier.log_odds[tuple(known[within].T)], later.log_odds[tuple(moved[within].T)]
-    return float(np.count_nonzero(np.sign(before) == np.sign(after)) / len(known))
 
 
 @pytest.mark.slow  # a long story; tests/simulation/building/test_lift.py has the ride
@@ -191,24 +175,9 @@ async def test_ride_given_up_in_the_car(tour: Tour) -> None:
 
 @pytest.fixture
 async def aboard(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[LiftFloors]:
-    """The floors of a robot that takes any place for the car, needs no way into it, and rides five seconds."""
-
-    async def already_there(*, backwards: bool) -> None:
-        assert backwards in (True, False)
-
-    async def five_seconds(floor: int) -> None:
-        await tour.clock.sleep(5.0)
-        monkeypatch.setattr(type(lift), "state", replace(lift.state, floor=floor, target=None))
-
-    floors, lift = tour.robot[Floors], tour.robot[LiftClient]
-    assert isinstance(floors, LiftFloors)
-    monkeypatch.setattr(LiftFloors, "_is_aboard", True)
-    monkeypatch.setattr(floors, "_through", already_there)
-    monkeypatch.setattr(floors, "_comes", five_seconds)
-    say_where_the_lift_is(tour)
-    yield floors
-    monkeypatch.setattr(LiftFloors, "_is_aboard", False)
-    await tour.clock.advance(1.0)  # a stay in the car ends
+    """The floors of a robot that is in the lift at once."""
+    async with quick_lift(tour, monkeypatch) as floors:
+        yield floors
 
 
 async def test_closing_server_begins_no_stay(tour: Tour, aboard: LiftFloors) -> None:

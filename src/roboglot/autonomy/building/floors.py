@@ -62,6 +62,8 @@ class LiftFloors(Floors):
         self._stay: asyncio.Task[None] | None = None  # in the car, after a ride that was given up there …
         self._maps_outside = False  # … and that the robot mapped before
         self._closed = False
+        self._redraws = False  # whether the last exchange of floors exchanged the annotations, too
+        self._exchanging: asyncio.Task[None] | None = None  # the last one of a ride
         robot.events.listen(MapReplaced, self._replaced)
 
     @property
@@ -72,6 +74,26 @@ class LiftFloors(Floors):
         self._check(floor)
         if self._stay is None:  # else the car decides
             self._current = floor
+
+    async def be_carried(self, floor: int) -> None:
+        self._check(floor)
+        belief, mapped = self.belief, self._end_stay()
+        belief.mapping = False
+        try:
+            with exchange(self.robot):
+                if self._exchanging is not None:
+                    await asyncio.wait([self._exchanging])
+                async with self._changing:
+                    now = self.robot.clock.time()
+                    if floor != self._current:
+                        await self._restore(floor, self._redraws, carried=True)
+                        self.robot.events.publish(FloorReached(stamp=now, floor=floor, place=None))
+                    elif self._places is not None and self._is_aboard:  # else it would believe to ride on
+                        home = self.robot[Docking].home if Docking in self.robot else None
+                        belief.take_pose(home or self._places[0])
+                        self.robot.events.publish(PoseJumped(stamp=now, pose=belief.pose, given=True))
+        finally:
+            belief.mapping = mapped
 
     def set_lift(self, waiting: Pose, inside: Pose) -> None:
         numbers = (waiting.x, waiting.y, waiting.yaw, inside.x, inside.y, inside.yaw)
@@ -281,7 +303,7 @@ class LiftFloors(Floors):
 
     async def _change_to(self, floor: int, redraw: bool) -> None:
         """Exchange the floors to the end, even if the ride is given up meanwhile: half of it would mix them."""
-        exchange = asyncio.get_running_loop().create_task(self._exchange(floor, redraw))
+        exchange = self._exchanging = asyncio.get_running_loop().create_task(self._exchange(floor, redraw))
         try:
             await asyncio.shield(exchange)
         except asyncio.CancelledError:
@@ -297,30 +319,40 @@ class LiftFloors(Floors):
                     now, place = self.robot.clock.time(), self.belief.pose.relative_to(self._places[1])
                     self.robot.events.publish(FloorReached(stamp=now, floor=floor, place=place))
 
-    async def _restore(self, floor: int, redraw: bool) -> None:
-        """Store the present floor's state and restore that of ``floor``, keeping the robot's place in the car."""
-        assert self._places is not None
-        robot, belief = self.robot, self.belief
-        waiting, inside = self._places
+    async def _restore(self, floor: int, redraw: bool, *, carried: bool = False) -> None:
+        """Store the present floor's state and restore that of ``floor``.
+
+        The robot keeps its place in the car, unless it was ``carried``: then it may be anywhere, as on its dock.
+        """
+        robot, belief, self._redraws = self.robot, self.belief, redraw
         drawn = robot[MapAnnotations].current if MapAnnotations in robot else Annotations()
         home = robot[Docking].home if Docking in robot else None
-        old = Storey(belief.map, home, drawn, waiting, inside)
-        # An operation that replaces the annotations also saves them in the building's map store.
-        await self._others.put(self._current, old, lasting=redraw)
+        if self._places is not None:
+            old = Storey(belief.map, home, drawn, *self._places)
+            # An operation that replaces the annotations also saves them in the building's map store.
+            await self._others.put(self._current, old, lasting=redraw)
         new = await self._others.take(floor)
         here, stamp = belief.pose, robot.clock.time()
         if new is None:
             belief.forget_map()
-            new = Storey(belief.map, None, Annotations(), waiting.relative_to(here), inside.relative_to(here))
+        elif carried:
+            belief.take_map(new.map, new.home or new.waiting)
         else:
-            belief.take_map(new.map, new.inside.compose(here.relative_to(inside)))
-        self._current, self._places = floor, (new.waiting, new.inside)
+            assert self._places is not None
+            belief.take_map(new.map, new.inside.compose(here.relative_to(self._places[1])))
+        if new is not None:
+            self._places = new.waiting, new.inside
+        elif carried:
+            self._places = None
+        elif self._places is not None:
+            self._places = self._places[0].relative_to(here), self._places[1].relative_to(here)
+        self._current = floor
         robot.events.publish(MapReplaced(stamp=stamp))
-        robot.events.publish(PoseJumped(stamp=stamp, pose=belief.pose))
+        robot.events.publish(PoseJumped(stamp=stamp, pose=belief.pose, given=carried))
         if Docking in robot:
-            robot[Docking].set_home(new.home)
-        if redraw and MapAnnotations in robot and drawn != new.drawn:
-            kept = new.drawn
+            robot[Docking].set_home(new.home if new else None)
+        kept = new.drawn if new else Annotations()
+        if redraw and MapAnnotations in robot and drawn != kept:
             await robot[MapAnnotations].change(lambda _: kept)
 
 

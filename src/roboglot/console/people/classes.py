@@ -24,6 +24,7 @@ from roboglot.control.lease_server import LEASE
 from roboglot.hosting.steady_time import SteadyTime
 from roboglot.model.admission import Proof, Right
 from roboglot.model.components.system.lease import TEACHER, Lease
+from roboglot.model.components.system.resetting import reset
 from roboglot.model.errors import Forbidden, NotFound, Refused, RobotError
 from roboglot.model.robot import Robot
 from roboglot.values import dataclass
@@ -258,11 +259,9 @@ class Classes:
         if do == "reset":
             if name not in {placed.name for placed in self._desk.stage.robots}:
                 raise Refused(f"robot {name} is a real one: carry it back by hand")
-            self._desk.stage.refuse_reset(name)
-        if do in ("reset", "give_back", "close"):
+            await reset(robot, self._desk.stage, lambda: self._stop(name))
+        if do in ("give_back", "close"):
             await self._stop(name)
-        if do == "reset":
-            self._desk.stage.reset(name)
 
     async def _give_back(self, class_: OpenClass, seat: Seat) -> None:
         """Release a pupil's robot; the pupil must join again."""

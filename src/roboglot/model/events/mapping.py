@@ -94,11 +94,12 @@ class MapReplaced(Event):
 class FloorReached(Event):
     """The lift has brought the robot to another floor, counted from 0; its ride may have been given up.
 
-    ``place``: of base_link in the frame of its place in the car, on the floor's map, which is in use.
+    ``place``: of base_link in the frame of its place in the car, on the floor's map, which is in use. None: the robot
+    was carried there, and its place on the floor is unknown.
     """
 
     floor: int
-    place: Pose
+    place: Pose | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

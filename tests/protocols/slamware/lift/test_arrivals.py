@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
 
+from roboglot.control.lease_server import LeaseServer, Request
 from roboglot.model.components.mapping.floors import Floors
+from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_memory import MapMemory
 from roboglot.model.components.motion.navigation import Navigation
 from roboglot.model.events import FloorReached
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.slam.last_place import last_place
+from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
 from tests.narrowing import known
 from tests.protocols.slamware.lift.two_floors import (
@@ -55,3 +59,19 @@ async def test_questions_on_arrival_wait_for_new_floor(
     assert known(last_place(robot)).floor == here["map_id"]  # for its next start
     assert robot[Floors].current == 1
     assert (await client.get(f"{ACTIONS}/:current")).json()["stage"] == "IN_ELEVATOR"  # and out of it, here
+
+
+async def test_reset_robot_uses_start_floors_map(
+    world: World, robot: Robot, client: httpx.AsyncClient, forward: Forward, origin: Pose, tmp_path: Path
+) -> None:
+    await forward(seconds=1)
+    await two_floors(robot, client, origin)
+    robot.events.publish(FloorReached(stamp=robot.clock.time(), floor=1, place=Pose(0.1)))
+    assert (await client.get(f"{MULTI}/floors/:current")).json()["floor"] == "first"
+    await LeaseServer(tmp_path, world.robots, world.stage).do(Request("reset", "a"), robot)
+    assert (await client.get(f"{MULTI}/floors/:current")).json()["floor"] == "ground"
+    assert [place["id"] for place in (await client.get("/api/core/artifact/v1/pois")).json()] == ["g1"]
+    assert robot[Floors].current == 0
+    await forward(seconds=3)
+    assert robot[Localization].lost is None
+    assert robot[Localization].pose.distance_to(Pose()) < 0.05  # on its dock

@@ -34,6 +34,13 @@ class Floors(Component):
         """Declare the current map to be that of ``floor``. Raises InvalidGoal."""
 
     @abstractmethod
+    async def be_carried(self, floor: int) -> None:
+        """Use the map of ``floor``, to which the robot was carried, or a new one; the lidar has to find its place.
+
+        Raises InvalidGoal for a floor at which no lift stops.
+        """
+
+    @abstractmethod
     def set_lift(self, waiting: Pose, inside: Pose) -> None:
         """Set the poses to wait at and to stand at in the car, on the current map. Raises InvalidGoal."""
 

@@ -82,20 +82,22 @@ class Arrivals:
         try:
             floor = next((floor for floor in maps.floors if stop_at(self._context, floor.name) == event.floor), None)
             shared = shared_elevators(robot, floor) if floor else []
-            if floor is None or not shared:
+            if floor is None or not (shared or event.place is None):
                 stop = robot[LiftClient].floors[event.floor]
                 await maps.leave_floors(stop, self._car_alone(event.place))
                 raise NotFound(f"no loaded floor has a map of the lift's stop {stop}")
-            _, landing = shared[0]
-            await maps.enter(floor.name.building, floor.name.floor, landing.inside.compose(event.place))
-            robot[Floors].set_lift(landing.waiting(), landing.inside)
+            landing = shared[0][1] if shared else None
+            pose = landing.inside.compose(event.place) if landing and event.place else None
+            await maps.enter(floor.name.building, floor.name.floor, pose)
+            if landing is not None:
+                robot[Floors].set_lift(landing.waiting(), landing.inside)
         except RobotError as error:
             log.warning("robot %s was brought to a floor whose map it cannot use: %s", robot.id, error)
 
-    def _car_alone(self, place: Pose) -> Drawings:
-        """Return the car's area, if only one is drawn, as seen from the robot at ``place`` in it."""
+    def _car_alone(self, place: Pose | None) -> Drawings:
+        """Return the car's area, if only one is drawn, as seen from the robot at ``place`` in it; None: elsewhere."""
         now, elevators = self._context.robot[MapAnnotations].current, elevators_here(self._context.robot)
-        if len(elevators) != 1:
+        if len(elevators) != 1 or place is None:
             return Drawings((), Annotations(last_id=now.last_id))
         (elevator,) = elevators
         drawn = Drawings((), Annotations(areas=(elevator.area,), last_id=now.last_id))
