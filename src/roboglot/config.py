@@ -21,7 +21,7 @@ import msgspec
 
 from roboglot.spelling import instead
 from roboglot.text_files import parse_toml, text_of
-from roboglot.validation import host_and_port, why_invalid
+from roboglot.validation import host_and_port, path_of, why_invalid
 from roboglot.values import dataclass
 
 RECORDING = "recording:"  # prefix of the body of a recorded robot
@@ -292,7 +292,7 @@ def config_of(
             values[key] = before | value if isinstance(value, dict) and isinstance(before, dict) else value
     door_values = {name: values.pop(name) for name in doors if name in values}
     try:
-        config = msgspec.convert(values, Config, dec_hook=lambda kind, value: kind(value))
+        config = msgspec.convert(values, Config, dec_hook=path_of)
     except msgspec.ValidationError as error:
         raise ValueError(f"{origin}: {why_invalid(error, wanted=Config)}") from None
     sections = {name: _section(name, doors[name], section, origin) for name, section in door_values.items()}

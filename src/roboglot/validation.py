@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import TypeVar
 
 import msgspec
@@ -195,6 +196,16 @@ def host_and_port(text: str, field: str) -> tuple[str, int]:
     if not host or not port.isdecimal() or int(port) > PORT_MAX:
         raise ValueError(f"{field} must be HOST:PORT, not {text!r}")
     return host.strip("[]"), int(port)
+
+
+def path_of(kind: type[Path], value: object) -> Path:
+    """Return a setting that is a path. Raises TypeError in msgspec's words, to which it adds the setting's name."""
+    if isinstance(value, Path):
+        return value
+    try:
+        return kind(msgspec.convert(value, str))
+    except msgspec.ValidationError as error:
+        raise TypeError(str(error)) from None
 
 
 def decode_json(data: bytes | str, kind: type[T]) -> T:

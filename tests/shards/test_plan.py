@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import math
 import os
 import subprocess
 import sys
@@ -78,6 +79,9 @@ def test_shards_are_found_by_their_robots() -> None:
         (1, 1, {}, "10.0.0.1", "others could reach"),
         (1, 1, {}, "somewhere", "first address"),
         (2, 1, {}, "255.255.255.254", "no 2 addresses"),
+        (1, 1, {"data": 5}, FIRST_ADDRESS, "^the template: data must be text, not a whole number$"),
+        (1, 1, {"speed": math.nan}, FIRST_ADDRESS, "^the template: speed must be above 0, not nan$"),
+        (1, 1, {"speed": -1.0}, FIRST_ADDRESS, "^the template: speed must be above 0, not -1$"),
         (1, 1, {"data": "/var/robots"}, FIRST_ADDRESS, "must not have `data`"),
         (1, 1, {"lockstep": True}, FIRST_ADDRESS, "no standard input"),
         (2, 0, {"robots": [{"body": "slamware://10.0.0.1"}]}, FIRST_ADDRESS, "share the real robot slamware://10"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Iterator
@@ -126,6 +127,8 @@ def _refuse_unshareable(config: Config, worlds: int) -> None:
     """Raise ValueError if several worlds cannot have these settings."""
     if config.lockstep:
         raise ValueError("a template must not have `lockstep`: worlds of a fleet have no standard input")
+    if not 0.0 < config.speed < math.inf:
+        raise ValueError(f"the template: speed must be above 0, not {config.speed:g}")
     if worlds > 1 and (real := next((robot.body for robot in config.robots if robot.is_real), "")):
         raise ValueError(f"{worlds} worlds cannot share the real robot {real}")
     if (to := Path(config.record.to)).suffix == RECORDED:
