@@ -226,8 +226,10 @@ class Classes:
         if request.pupil and request.pupil not in class_.seats:
             raise NotFound(f"there is no pupil {request.pupil!r}")
         seats = [class_.seats[request.pupil]] if request.pupil else list(class_.seats.values())
-        for robot in dict.fromkeys(seat.robot for seat in seats):
-            await self._do_with(request.do, robot)
+        doing = (self._do_with(request.do, robot) for robot in dict.fromkeys(seat.robot for seat in seats))
+        ends = await asyncio.gather(*doing, return_exceptions=True)  # one that refuses spares no other
+        for error in filter(None, ends):
+            raise error
         if request.do in ("give_back", "close"):
             for seat in seats:
                 await self._give_back(class_, seat)
@@ -250,9 +252,13 @@ class Classes:
         robot, locked = self._desk.robots[name], self._desk.locked
         if do == "lock" and name not in locked:
             locked.add(name)
-            await self._stop(name)
-            with robot.inputs.noting(LEASE, "give", {"who": TEACHER}):
-                await robot[Lease].take(TEACHER)
+            try:
+                await self._stop(name)
+                with robot.inputs.noting(LEASE, "give", {"who": TEACHER}):
+                    await robot[Lease].take(TEACHER)
+            except BaseException:
+                locked.discard(name)  # it moves for its pupil as before
+                raise
         elif do in ("unlock", "close") and name in locked:
             locked.discard(name)
             await _release(robot)
