@@ -36,13 +36,14 @@ FIRST = IPv4Address(free_addresses(2))
 HOSTS = {"a": str(FIRST), "b": str(FIRST + 1)}
 MAY = {  # what each right allows: stop and drive, draw on the map, break the world
     "see": set[str](),
-    "drive": {"stop", "drive"},
-    "program": {"stop", "drive"},
+    "drive": {"stop", "all", "drive"},
+    "program": {"stop", "all", "drive"},
     "edit": {"draw"},
-    "admin": {"stop", "drive", "draw", "break"},
+    "admin": {"stop", "all", "drive", "draw", "break"},
 }
 BUTTONS = {
     "stop": ("live", "", ".stop"),
+    "all": ("robots", "", "button:has-text('Stop all')"),
     "drive": ("live", "#tab-state", "button:has-text('Take control')"),
     "draw": ("world", "#tab-drawn", "button:has-text('Save the map')"),
     "break": ("world", "#tab-faults", "button:has-text('Inject')"),
@@ -202,6 +203,7 @@ async def test_buttons_are_on_for_those_who_may(guarded: Guarded, open_page: Ope
         await page.wait_for_selector("text=no right to see any of these robots")
         return
     await page.wait_for_selector("text=Scan fits map")
+    assert await page.locator("text=Tap to send the robot").count() == int("drive" in MAY[who])
     assert {what for what in BUTTONS if await offered(page, what)} == MAY[who], who
     cookies = await page.context.cookies()
     assert {(c["httpOnly"], c["sameSite"]) for c in cookies} == {(True, "Strict")}

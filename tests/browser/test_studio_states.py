@@ -7,7 +7,8 @@ import json
 import pytest
 
 from roboglot.console.studio.channel import Session
-from tests.browser.served import Tabs, shows, until
+from roboglot.model.components.system.lease import TEACHER, Lease
+from tests.browser.served import Served, Tabs, shows, until
 from tests.browser.test_console_link import QUICKLY
 from tests.browser.test_studio import COUNTING, FOREVER, READY, Open, Page, loaded, phase, prints, studio
 
@@ -30,6 +31,19 @@ KEPT = (
     "language", "theme", "person", "robot", "studio.recent", "studio.stars", "studio.look", "studio.class",
     "studio.role", "studio.tab", "studio.unsent",
 )  # fmt: skip
+
+
+async def test_studio_says_who_alone_may_move(studio: Open, served: Served) -> None:
+    page, lease = await studio(), served.robot[Lease]
+    for who, said in (
+        (TEACHER, "The teacher has locked this robot: until it is unlocked, programs cannot move it."),
+        ("console anna", "Only console anna may move this robot at the moment: programs cannot."),
+        ("visual", None),
+        (TEACHER, "The teacher has locked this robot: until it is unlocked, programs cannot move it."),
+        ("", None),
+    ):
+        await (lease.take(who) if who else lease.release())
+        await shows(page, "document.querySelector('.banner')?.textContent ?? null", said)
 
 
 async def test_line_of_a_running_text_is_lit(studio: Open) -> None:

@@ -158,12 +158,11 @@ export function lacks(verb) {
   return !right || !mine || mine.includes(right) ? "" : t("right.missing", { right: t(`right.${right}`) });
 }
 
-/** A button; `on` shows that it is chosen; `verb` is what it has done: it is off without the right to that, and says why;
+/** A button; `on` shows that it is chosen; `verb` is what it has done: it is off without the right to that, or for another `why`, and says so;
  * not there without the part; `of` is what it is about, for those who do not see the row. @param {any} props */
-export function Button({ label, of = "", icon, on, verb, kind = "", compact = false, children, ...rest }) {
+export function Button({ label, of = "", icon, on, verb, why = lacks(verb), kind = "", compact = false, children, ...rest }) {
   if (!can(verb)) return null;
   const toggles = on === undefined ? {} : { "aria-pressed": String(Boolean(on)) };
-  const why = lacks(verb);
   const name = compact ? { "aria-label": label, title: label } : of ? { "aria-label": `${label}: ${of}` } : {};
   if (why) Object.assign(rest, { type: "button", "aria-disabled": "true", title: why, onClick: () => say(why, true) });
   return html`<button type="button" class=${`button ${kind} ${compact ? "compact" : ""}`} ...${toggles} ...${name} ...${rest}>

@@ -1,7 +1,7 @@
 // Windows over the page: the library, versions and files; the schedule of a program in plain words.
 import { effect, signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { Button, html, notice, say, t } from "../base.js";
+import { Button, html, lacks, notice, say, t } from "../base.js";
 import { asked, table, words } from "./blocks.js";
 import * as editor from "./editor.js";
 import { frame, listen } from "./link.js";
@@ -54,7 +54,7 @@ export function Library() {
     <div class="buttons"><${Button} label=${t("studio.file.json")} onClick=${() => download("json")} /><${Button} label=${t("studio.file.py")} onClick=${() => download("py")} />
       ${program.value.kind === "blocks" && html`<${Button} label=${t("studio.file.style")} onClick=${() => download("style")} />`}</div>
     <h3>${t("studio.on.robot")}</h3>
-    ${listed.value.length ? html`<ul class="rows">${runningFirst(listed.value).map((item) => html`<${Row} key=${item.id} item=${item} />`)}</ul>` : html`<p class="muted">${t("studio.on.robot.none")}</p>`}
+    ${listed.value.length ? html`<ul class="rows">${runningFirst(listed.value).map((item) => html`<${Row} key=${item.id} item=${item} />`)}</ul>` : html`<p class="muted">${lacks("program") || t("studio.on.robot.none")}</p>`}
     ${editor.modules.value.length > 0 && html`<h3>${t("studio.toolbox.modules")}</h3><ul class="rows">${editor.modules.value.map((m) => html`<li><span class="grow"><b>${m.condition}</b><small>${m.describe}</small></span>
       <${Button} verb="program" label=${t("studio.open")} onClick=${() => openModule(m).then(close, (error) => say(error.message, true))} />
       <${Button} verb="program" kind="danger" label=${t("studio.delete")} onClick=${() => { if (confirm(t("studio.delete.sure", { name: m.condition }))) removeModule(m).catch((error) => say(error.message, true)); }} /></li>`)}</ul>`}

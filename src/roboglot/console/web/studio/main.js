@@ -2,7 +2,7 @@
 import { render } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import { computed, effect, signal, untracked } from "@preact/signals";
-import { Button, Icon, PATHS, html, kept, lacks, language, loadWords, notice, place, say, t, theme } from "../base.js";
+import { Button, Icon, PATHS, html, kept, lacks, language, loadWords, notice, place, robotWord, say, t, theme } from "../base.js";
 import { choose, connect as connectRobot, current, hello, me, state, status, want } from "../link.js";
 import { loadTable } from "./blocks.js";
 import { Group } from "./class.js";
@@ -87,9 +87,18 @@ function Bar() {
   </div>`;
 }
 
+const TEACHER = "console teacher"; // a role: who locked the robots of a class
+/** The client that alone may move the robot; empty: this program may, too. */
+function holder() {
+  const taken = state.value?.control?.taken_by ?? "";
+  return taken && !`visual ${program.value.id} `.startsWith(`${taken} `) ? taken : "";
+}
+
 function Banner() {
   if (online.value === "lost" || status.value === "lost") return html`<div class="banner bad" role="alert">${t(runner.phase.value === "idle" ? "studio.lost" : "studio.lost.running")}</div>`;
   if (unopened.value) return html`<div class="banner warn" role="status">${t("studio.unopened", { why: unopened.value })}</div>`;
+  const who = holder();
+  if (who) return html`<div class="banner warn" role="status">${who === TEACHER ? t("studio.locked") : t("studio.held", { who: robotWord(who) })}</div>`;
   return null;
 }
 

@@ -1,6 +1,6 @@
 // The live view: map, tools to send the robot somewhere, and beside it what it is, does and has done.
 import { signal } from "@preact/signals";
-import { Button, Icon, can, doing, duration, fixed, html, person, robotWord, say, t } from "../base.js";
+import { Button, Icon, can, doing, duration, fixed, html, lacks, person, robotWord, say, t } from "../base.js";
 import { MapView } from "../map.js";
 import { command, current, introduce, me, poses, simulated, stale, state, wanted, you } from "../link.js";
 import { Drive } from "./drive.js";
@@ -31,7 +31,7 @@ const TOOLS = {
   ruler: { drag: (from, to) => { measure.value = [from, to]; }, done: () => {}, drop: () => {} },
 };
 const NEEDS = { go: "go_to", route: "go_to" };
-const used = () => (can(NEEDS[tool.value]) ? tool.value : "pan");
+const used = () => (can(NEEDS[tool.value]) && !lacks(NEEDS[tool.value]) ? tool.value : "pan");
 const ICONS = { go: "goal", route: "route", pan: "hand", ruler: "ruler" };
 
 function Tools() {
@@ -63,7 +63,7 @@ const minutes = (seconds) => (seconds >= 3600 ? duration(seconds) : t("time.whol
 function Control() {
   const control = state.value.control, mine = control.taken_by && control.taken_by === you.value;
   const who = control.taken_by || control.holder;
-  const word = control.taken_by ? (mine ? t("control.mine") : t("control.taken", { who })) : who ? t("control.moves", { who, doing: robotWord(control.doing) }) : t("control.free");
+  const word = control.taken_by ? (mine ? t("control.mine") : t("control.taken", { who: robotWord(who) })) : who ? t("control.moves", { who, doing: robotWord(control.doing) }) : t("control.free");
   return html`<div class="card"><h3>${t("control")}</h3><p class=${control.taken_by && !mine ? "warned" : ""}>${word}</p>
     ${!me.value.name && html`<label class="field"><span>${t("control.name")}</span><input value=${person.value} maxlength="40" autocomplete="nickname"
       onChange=${(e) => { person.value = e.target.value.trim() || person.value; introduce(); }} /></label>`}

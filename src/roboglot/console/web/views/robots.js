@@ -3,6 +3,9 @@ import { useEffect, useState } from "preact/hooks";
 import { Button, Icon, doing, fixed, html, robotWord, say, t } from "../base.js";
 import { ask, choose, hello, poses, states, status } from "../link.js";
 
+/** Why a robot is not for this person to stop; empty: it is. */
+const lacking = (robot) => (robot.rights.includes("drive") ? "" : t("right.missing", { right: t("right.drive") }));
+
 async function stopAll() {
   const names = hello.value.robots.map((r) => r.name);
   const results = await Promise.allSettled(names.map((name) => ask(name, "stop")));
@@ -32,14 +35,14 @@ function Tile({ robot }) {
     ${pose && !lost && state.parts.includes("mapping") && html`<${Thumbnail} name=${robot.name} />`}<h2>${t("robot.named", { name: robot.name })}<small>${about.maker} ${about.model}</small></h2>
     ${lost && html`<p class="warned">${t("link.stale")}</p>`}<dl><div class="row"><dt>${t("battery")}</dt><dd class=${battery?.low ? "bad" : ""}>${battery ? `${Math.round(battery.charge * 100)} %` : "–"}${battery?.charging ? ` · ${t("charging")}` : ""}</dd></div>
       <div class="row"><dt>${t("task")}</dt><dd>${doing(state) || (safety.docked ? t("docked") : t("task.none"))}</dd></div>
-      <div class="row"><dt>${t("control")}</dt><dd>${control.taken_by || control.holder || t("control.nobody")}</dd></div>
+      <div class="row"><dt>${t("control")}</dt><dd>${robotWord(control.taken_by || control.holder) || t("control.nobody")}</dd></div>
       <div class="row"><dt>${t("pose")}</dt><dd>${pose ? `${fixed(pose[0], 1)}, ${fixed(pose[1], 1)} m` : "–"}</dd></div></dl>
     ${safety.emergency_stop ? html`<p class="warned"><${Icon} name="alert" size=${16} />${t("estop.on")}</p>` : faults.length ? html`<p class="warned"><${Icon} name="alert" size=${16} />${robotWord(faults[0].name)}${faults.length > 1 ? ` +${faults.length - 1}` : ""}</p>` : !lost && html`<p class="allwell">${t("faults.none")}</p>`}
-    <div class="buttons"><${Button} kind="main" label=${t("show")} of=${robot.name} onClick=${open} /><${Button} icon="stop" label=${t("stop")} of=${robot.name} disabled=${!robot.rights.includes("drive")} title=${robot.rights.includes("drive") ? "" : t("right.missing", { right: t("right.drive") })} onClick=${() => ask(robot.name, "stop").catch((e) => say(e.message, true))} /></div></li>`;
+    <div class="buttons"><${Button} kind="main" label=${t("show")} of=${robot.name} onClick=${open} /><${Button} icon="stop" label=${t("stop")} of=${robot.name} why=${lacking(robot)} onClick=${() => ask(robot.name, "stop").catch((e) => say(e.message, true))} /></div></li>`;
 }
 
 export function Robots() {
   return html`<section class="robots" aria-label=${t("view.robots")}><div class="bar"><h1>${t("robots.all", { n: hello.value.robots.length, world: hello.value.world })}</h1>
-    <${Button} kind="danger" icon="stop" label=${t("stop.all")} onClick=${stopAll} /></div>
+    <${Button} kind="danger" icon="stop" label=${t("stop.all")} why=${hello.value.robots.every(lacking) ? lacking(hello.value.robots[0]) : ""} onClick=${stopAll} /></div>
     <ul class="tiles">${hello.value.robots.map((robot) => html`<${Tile} key=${robot.name} robot=${robot} />`)}</ul></section>`;
 }

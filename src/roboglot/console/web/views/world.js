@@ -1,7 +1,7 @@
 // The workshop: change a simulated world, and draw on the robot's map.
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
-import { Button, can, html, robotWord, say, t } from "../base.js";
+import { Button, can, html, lacks, robotWord, say, t } from "../base.js";
 import { MapView, floorShown as floor, toWorld } from "../map.js";
 import { changeWorld, command, current, hello, poses, simulated, state, truth, want } from "../link.js";
 import { Clock } from "./clock.js";
@@ -135,12 +135,12 @@ export function World() {
   const drawn = can("mapping") && { drawn: Drawn }, tabs = simulated.value ? { people: People, faults: Faults, ...drawn, clock: Clock } : { drawn: Drawn };
   const Shown = tabs[tab.value] ?? Object.values(tabs)[0];
   const tools = Shown === Drawn ? MAP_TOOLS : WORLD_TOOLS;
-  const used = tool.value in tools ? tool.value : Object.keys(tools)[0];
+  const used = [tool.value, ...Object.keys(tools)].find((name) => name in tools && can(NEEDS[name]) && !lacks(NEEDS[name])) ?? "";
   return html`<div class="split">
     <${MapView} tool=${tools[used]} overlay=${shape.value}>
       <div class="tools" role="toolbar" aria-label=${t("tools")}>${Object.keys(tools).map((name) => html`
         <${Button} compact icon=${ICONS[name]} label=${t(`tool.${name}`)} verb=${NEEDS[name]} on=${used === name} onClick=${() => { tool.value = name; }} />`)}</div>
-      <p class="hint">${t(`tool.${used}.hint`)}</p><//>
+      ${used && html`<p class="hint">${t(`tool.${used}.hint`)}</p>`}<//>
     <aside><${Tabs} tabs=${tabs} chosen=${tab} label=${t("panels")} />
       <div id="panel" class="panel" role="tabpanel" aria-labelledby=${`tab-${tab.value}`} tabindex="0"><h2 class="unseen">${t(`tab.${Object.keys(tabs).find((name) => tabs[name] === Shown)}`)}</h2>${state.value ? html`<${Shown} />` : null}</div></aside>
   </div>`;
