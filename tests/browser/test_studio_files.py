@@ -16,6 +16,7 @@ __all__ = ["studio"]  # the fixture
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 EXAMPLES = Path(__file__).parents[2] / "examples" / "programs"
 FILE = {"name": "f.py", "mimeType": "text/x-python"}
+TIMES = "n => studio.editor.workspace.getBlockById('loop').getInputTargetBlock('TIMES').setFieldValue(n, 'NUM')"
 FADE = "import('/base.js').then(base => { base.notice.value = { text: '', bad: false }; })"  # it stands for 8 s
 
 
@@ -42,6 +43,32 @@ async def test_program_of_blocks_comes_back_from_its_file(studio: Open) -> None:
     for wanted in ("For the app (style)", "Program"):
         await comes_back(page, wanted)
     assert page.errors == []
+
+
+async def test_program_changed_elsewhere_is_not_overwritten(studio: Open) -> None:
+    page, other = await loaded(await studio(), COUNTING), await studio()
+    own = await page.evaluate("studio.program.value.id")
+
+    async def has(name: str, times: int) -> None:
+        asking = f"link.ask({{ type: 'fetch', program: '{name}', log: false }})"
+        found = f"import('/studio/link.js').then(link => {asking}).then(({{ program }}) => program?.body ?? '')"
+        await shows(page, f"{found}.then(body => body.includes('range({times})'))", True)
+
+    await has(own, 3)
+    await other.evaluate(f"import('/studio/program.js').then(p => p.openStored('{own}'))")
+    for times in (4, 5):  # one's own changes
+        await other.evaluate(TIMES, times)
+        await has(own, times)
+    assert await other.evaluate("studio.program.value.id") == own
+    await page.evaluate(TIMES, 9)
+    await page.wait_for_selector(".notice >> text=Yours goes on as “My program (my copy)”; theirs is under Programs.")
+    copy = await page.evaluate("studio.program.value.id")
+    await has(copy, 9)
+    await has(own, 5)
+    await page.evaluate(TIMES, 10)  # in its own place
+    await has(copy, 10)
+    assert await page.evaluate("studio.program.value.id") == copy != own
+    assert page.errors == other.errors == []
 
 
 async def test_going_back_to_a_version_loses_nothing(studio: Open) -> None:

@@ -7,7 +7,7 @@ import { newId } from "./blocks.js";
 import { ask, frame, opened } from "./link.js";
 
 const PREFIX = "studio.program.", VERSIONS_MAX = 20, VERSION_EVERY = 60_000, SAVE_AFTER = 1500; // ms
-const FILE_MAX = 4_000_000, TEXT_MAX = 262_144, BLOCKS_MAX = 6000, NAME_MAX = 60; // bytes; characters; blocks of a file
+const FILE_MAX = 4_000_000, TEXT_MAX = 262_144, BLOCKS_MAX = 6000, NAME_MAX = 60, PARTED = 12; // bytes; characters; blocks of a file; characters
 export const body = signal(""); // of a program that is text
 const opening = /** @type {any} */ (read(kept("studio.last", "").value));
 export const program = signal(/** @type {{id: string, name: string, kind: "blocks" | "text", lesson?: string, module?: string}} */ (
@@ -106,10 +106,45 @@ export function unnamed(id) {
 }
 
 const described = (/** @type {{name: string, id: string}} */ of) => (of.name || unnamed(of.id)).replaceAll('"""', "'");
-/** The frame that saves a program. @param {any} [of] as ``whole`` makes it */
-export const saveFrame = (of = whole()) => frame({
-  type: "task", operate: "save", target_id: [of.id], describe: described(of),
-  style: of.id === program.value.id ? style() : JSON.stringify(of.style ?? { roboglot: { kind: "text" } }), mode: "single", condition: "now", body: of.body });
+/** Save a program; under another id, which ``of`` then has, if it would overwrite another page's. @param {any} [of] as ``whole`` makes it */
+export async function saveFrame(of = whole()) {
+  const made = of.id === program.value.id ? style() : JSON.stringify(of.style ?? { roboglot: { kind: "text" } });
+  await part(of, made);
+  shared(of.id, of.body, made); // first: another save may look before this one is answered
+  return frame({ type: "task", operate: "save", target_id: [of.id], describe: described(of), style: made, mode: "single", condition: "now", body: of.body });
+}
+
+const SHARED_MAX = 8; // newest forms of a program that this browser has read from a robot, or sent to it
+const sharedHere = /** @type {Record<string, string[]>} */ ({ __proto__: null }); // where nothing can be kept
+const placeOf = (/** @type {string} */ id) => `studio.shared.${opened.value?.robot ?? ""}.${id}`;
+/** A short form of a program, to compare. @param {string} code @param {string} made */
+function mark(code, made) {
+  let sum = 0;
+  for (const text of [code, made]) for (let i = 0; i < text.length; i++) sum = (Math.imul(sum, 31) + text.charCodeAt(i)) | 0;
+  return `${code.length}.${made.length}.${sum}`;
+}
+/** @param {string} id @returns {string[]} */
+function known(id) { try { return JSON.parse(localStorage.getItem(placeOf(id)) ?? "[]"); } catch { return sharedHere[placeOf(id)] ?? []; } }
+/** The robot has it in this form. @param {string} id @param {string} code @param {string} made */
+function shared(id, code, made) {
+  const now = [mark(code, made), ...known(id)].slice(0, SHARED_MAX);
+  sharedHere[placeOf(id)] = now;
+  try { localStorage.setItem(placeOf(id), JSON.stringify(now)); } catch { /* as long as the page */ }
+}
+
+/** Give a program that someone else has changed on the robot an id and a name of its own. @param {any} of @param {string} made */
+async function part(of, made) {
+  const forms = known(of.id);
+  if (!forms.length) return; // never there
+  const { program: found } = await ask({ type: "fetch", program: of.id, log: false });
+  if (!found || [...forms, mark(of.body, made)].includes(mark(found.body, found.style))) return;
+  const { id } = of, name = t("studio.parted.name", { name: described(of).slice(0, NAME_MAX - PARTED) });
+  Object.assign(of, { id: `s${newIdSafe()}`, name });
+  note(id, false);
+  if (id === program.value.id) { program.value = { ...program.value, id: of.id, name }; keep(); } else localStorage.setItem(PREFIX + of.id, JSON.stringify(of));
+  note(of.id, true);
+  say(t("studio.parted", { name }), true);
+}
 
 /** Whether the robot has exactly this program, and it is right: then it need not be saved and checked before it runs. */
 export async function isStored() {
@@ -189,6 +224,7 @@ export async function openStored(id) {
   let made = null;
   try { made = JSON.parse(found.style); } catch { /* the app's or another front end's */ }
   const blocks = made && made.blocks && Array.isArray(made.blocks.blocks) && made.blocks.blocks.length;
+  shared(id, found.body, found.style);
   show({ id, name: found.describe, kind: blocks ? "blocks" : "text", style: made, body: found.body });
   stored.value = "robot";
 }
