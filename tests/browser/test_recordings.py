@@ -1,13 +1,15 @@
-"""Recordings on pages: made, found again, fetched and deleted."""
+"""Recordings and stored maps on pages: made, found again, fetched, replaced and deleted."""
 
 from __future__ import annotations
 
 import asyncio
+from typing import Any
 
 import pytest
 
+from roboglot.model.components.mapping.map_library import MapLibrary
 from roboglot.recording.reader import read_recording
-from tests.browser.served import OpenConsole, Served
+from tests.browser.served import OpenConsole, Served, becomes
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
@@ -41,3 +43,35 @@ async def test_a_recording_is_begun_marked_and_ended(served: Served, open_consol
     await row.locator("text=Remove").click()  # the question is answered above
     await page.wait_for_selector("text=Nothing has been recorded yet.")
     assert not file.exists()
+
+
+async def test_stored_map_is_replaced_only_when_confirmed(served: Served, open_console: OpenConsole) -> None:
+    name, sure = "Name of the map", "Replace the stored map hall?"
+    page, library, asked = await open_console(view="world"), served.robot[MapLibrary], list[str]()
+    confirmed = True
+
+    async def answer(dialog: Any) -> None:
+        asked.append(dialog.message)
+        await (dialog.accept("hall ") if confirmed or dialog.message == name else dialog.dismiss())
+
+    async def save(*questions: str) -> None:
+        asked.clear()
+        await page.click("button:has-text('Save the map')")
+        await becomes(lambda: asyncio.sleep(0, [*asked]), [*questions])
+
+    async def saved_at() -> float | None:
+        return (await library.get("hall")).saved_at if "hall" in await library.names() else None
+
+    page.on("dialog", lambda dialog: asyncio.ensure_future(answer(dialog)))
+    await page.click("#tab-drawn")
+    await save(name)
+    await becomes(saved_at, served.clock.epoch())
+    first = served.clock.epoch()
+    await served.clock.advance(1.0)
+    confirmed = False
+    await save(name, sure)
+    assert await saved_at() == first
+    confirmed = True
+    await save(name, sure)
+    await becomes(saved_at, served.clock.epoch())
+    await library.remove("hall")

@@ -31,7 +31,11 @@ function Merge() {
 
 export function Maps() {
   useEffect(() => { refresh(); }, [current.value]);
-  const save = () => { const map = prompt(t("map.name")); if (map) change("save_map", { map }, t("map.saved", { map })); };
+  const save = async () => {
+    const map = prompt(t("map.name"))?.trim();
+    if (map) await refresh(); // another page may have stored one since
+    if (map && (!kept.value.includes(map) || confirm(t("map.replace.sure", { map })))) await change("save_map", { map }, t("map.saved", { map }));
+  };
   return html`<div class="card"><h3>${t("maps")}</h3>
     ${kept.value.length ? html`<ul class="list">${kept.value.map((map) => html`<li><span>${map}</span>
       <${Button} label=${t("map.load")} of=${map} verb="load_map" onClick=${() => change("load_map", { map }, t("map.loading", { map }))} />
