@@ -61,7 +61,7 @@ async def test_program_changed_elsewhere_is_not_overwritten(studio: Open) -> Non
         await has(own, times)
     assert await other.evaluate("studio.program.value.id") == own
     await page.evaluate(TIMES, 9)
-    await page.wait_for_selector(".notice >> text=Yours goes on as “My program (my copy)”; theirs is under Programs.")
+    await page.wait_for_selector(r".notice >> text=/Yours goes on as “My program( \d+)? \(my copy\)”; theirs is under/")
     copy = await page.evaluate("studio.program.value.id")
     await has(copy, 9)
     await has(own, 5)
