@@ -47,6 +47,8 @@ async def test_program_of_blocks_comes_back_from_its_file(studio: Open) -> None:
 
 async def test_program_changed_elsewhere_is_not_overwritten(studio: Open) -> None:
     page, other = await loaded(await studio(), COUNTING), await studio()
+    for one in (page, other):  # until then the server answers nothing about programs
+        await shows(one, "import('/studio/link.js').then(link => Boolean(link.opened.value))", True)
     own = await page.evaluate("studio.program.value.id")
 
     async def has(name: str, times: int) -> None:
