@@ -167,6 +167,7 @@ async def test_signing_out_ends_open_pages_and_sound(tmp_path: Path) -> None:
     (tmp_path / "w").mkdir()
     store = open_store(tmp_path / "w")
     store.add_person("mx", PASSWORD, [Grant("*", frozenset({Right.ADMIN}))])
+    store.close()
     access = AccessConfig(on=True, local=False)
     async with world(tmp_path, "w", ADDRESS, shared=False, access=access) as served, asyncio.timeout(60):
         (_, _, left), (_, _, kept) = [await signed(served, name="mx", password=PASSWORD) for _ in range(2)]
