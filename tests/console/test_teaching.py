@@ -1,4 +1,4 @@
-"""A teacher's class at one console: what one robot refuses happens to all others all the same."""
+"""Class of two robots: what one of them refuses is still done with the other."""
 
 from __future__ import annotations
 
