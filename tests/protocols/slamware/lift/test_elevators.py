@@ -210,6 +210,71 @@ async def test_into_car_that_others_command_and_out_again(
     ]
 
 
+async def stand_in(client: httpx.AsyncClient, world: World, forward: Forward, place: Pose) -> None:
+    """Put the robot, without any map, to ``place`` in the world, with the car's area on a new map around it."""
+    world.stage.person("person 0 0").place(28.5, 10.5)  # out of the way
+    await forward(seconds=1)
+    world.stage.place("a", place)
+    assert (await client.delete("/api/core/slam/v1/maps")).status_code == 200
+    assert (await client.post(AREAS, json=area_of(place))).status_code == 200
+    await forward(seconds=2)
+
+
+@pytest.mark.parametrize(
+    ("limit", "blocked", "reason"),
+    [
+        ({}, True, "CANNOT_REACH_TARGET"),
+        ({"search_path_timeout_in_ms": 5000}, True, "no path out of the elevator was found in time"),
+        ({"arrive_door_timeout_in_ms": 300}, False, "the robot did not reach the elevator's door in time"),
+        ({"on_elevator_door_timeout_in_ms": 200}, False, "PATH_OCCUPIED"),
+        (dict.fromkeys(("search_path_timeout_in_ms", "arrive_door_timeout_in_ms"), 30_000), False, ""),
+        ({"on_elevator_door_timeout_in_ms": 30_000}, False, ""),
+    ],
+)
+async def test_leaving_is_given_up_at_each_limit(
+    robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward,
+    limit: dict[str, int], blocked: bool, reason: str,
+) -> None:  # fmt: skip
+    await stand_in(client, world, forward, Pose(0.95, 10.0))
+    robot[LiftClient].hold_door(60.0)
+    if blocked:
+        world.stage.add_obstacle(Pose(2.1, 10.0), (0.3, 1.6, 1.0))
+    await forward(seconds=5)
+    await client.get("/api/platform/v1/events")
+    id = await start(client, "LeaveElevatorAction", elevator_id=LIFT, leave_elevator_options=limit)
+    ended, _ = await finish(client, forward, id, within=40)
+    assert ended == {"status": 4, "result": -1 if reason else 0, "reason": reason}
+    events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
+    assert ("LEAVE_ELEVATOR_FAILED" in events, "OUT_OF_ELEVATOR" in events) == (bool(reason), not reason)
+
+
+async def test_path_out_of_car_is_searched_until_limit(
+    robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
+) -> None:
+    await stand_in(client, world, forward, Pose(0.95, 10.0))
+    robot[LiftClient].hold_door(60.0)
+    box = world.stage.add_obstacle(Pose(2.1, 10.0), (0.3, 1.6, 1.0))
+    await forward(seconds=5)
+    limit = {"search_path_timeout_in_ms": 40_000}
+    id = await start(client, "LeaveElevatorAction", elevator_id=LIFT, leave_elevator_options=limit)
+    await forward(seconds=10)
+    world.stage.remove_obstacle(box)
+    assert (await finish(client, forward, id, within=60))[0] == SUCCESS
+
+
+@pytest.mark.parametrize(("options", "x"), [({}, 0.95), ({"use_conservative_mode": False}, 0.6)])
+async def test_robot_squeezes_in_if_asked(
+    robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, options: dict[str, bool], x: float
+) -> None:
+    await stand_in(client, world, forward, Pose(3.2, 10.0, math.pi))
+    robot[LiftClient].hold_door(120.0)
+    await forward(seconds=5)
+    id = await start(client, "EnterElevatorAction", elevator_id=LIFT, enter_elevator_options=options)
+    ended, _ = await finish(client, forward, id, within=60)
+    assert ended == SUCCESS
+    assert world.truth.pose_of("a").distance_to(Point(x, 10.0)) < 0.12
+
+
 @pytest.mark.slow  # a long story; the rides above have its parts
 async def test_orders_on_two_floors_and_the_dock_below(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose

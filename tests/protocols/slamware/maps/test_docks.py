@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import httpx
+import pytest
 
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
@@ -89,6 +90,31 @@ async def test_the_bound_dock_is_home(robot: Robot, client: httpx.AsyncClient, f
     assert [dock["id"] for dock in (await client.get(f"{MULTI}/homedocks")).json()] == ["near", "far"]
 
 
+@pytest.mark.parametrize("bound", [None, "near"])
+async def test_home_pose_chooses_a_dock(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward, bound: str | None
+) -> None:
+    """With several docks on the map, the client sets which one is in use: the others stay where they are."""
+    await forward(seconds=1)
+    named = [
+        {"id": id, "pose": {"x": x, "y": 0.0, "yaw": 0.5}, "metadata": {"display_name": id}}
+        for id, x in (("near", 1.0), ("far", 9.0))
+    ]
+    await ok(await client.put(f"{SLAM}/homedocks", json=named))
+    current = f"{MULTI}/homedocks/:current"
+    if bound:
+        await ok(await client.post(f"{MULTI}/stcm/:sync"))
+        await ok(await client.put(current, json={"dock_id": bound}))
+    await ok(await client.put(f"{SLAM}/homepose", json={"x": 9.0, "y": 0.0, "yaw": 0.5}))
+    assert robot[Docking].home == Pose(9.0, 0.0, 0.5)
+    docks = (await client.get(f"{SLAM}/homedocks")).json()
+    assert sorted(docks, key=lambda dock: dock["pose"]["x"]) == named
+    assert (await client.get(current)).json().get("data", {}).get("id") == (bound and "far")
+    await ok(await client.put(f"{SLAM}/homepose", json={"x": 8.0, "y": 0.0, "yaw": 0.5}))  # at none: moves it
+    xs = {dock["id"]: dock["pose"]["x"] for dock in (await client.get(f"{SLAM}/homedocks")).json()}
+    assert xs == {"near": 1.0, "far": 8.0}
+
+
 async def test_clearing_docks_answers_the_former_home_or_null(client: httpx.AsyncClient, forward: Forward) -> None:
     await forward(seconds=1)
     docks = "/api/core/slam/v1/homedocks"
@@ -121,6 +147,25 @@ async def test_home_is_on_start_or_bound_floor(robot: Robot, client: httpx.Async
     assert (maps.home(), await start_floors()) == ("A/2", ["2"])
     await ok(await client.post(f"{MULTI}/stcm/:reload"))  # as after a restart
     assert (await client.get(current)).json()["floor"] == "2"
+
+
+async def test_binding_start_floors_dock_moves_no_robot(robot: Robot, client: httpx.AsyncClient, drawn: None) -> None:
+    """Only a dock elsewhere asks for a robot that was pushed onto it: this one is upstairs, and stays there."""
+    grid, current = robot[Mapping].grid, f"{MULTI}/floors/:current"
+    lower, upper = (FloorMap(FloorName("A", name, order, default=not order), grid) for order, name in enumerate("12"))
+    layers = (*composite_of(with_dock(lower, "below")).layers, *composite_of(with_dock(upper, "above")).layers)
+    await ok(await client.post(f"{MULTI}/stcm", content=encode_stcm(CompositeMap(layers))))
+    await ok(await client.post(f"{MULTI}/stcm/:reload"))
+    pose = {"x": 0.5, "y": 0.25, "yaw": 0.0}
+    await ok(await client.put(current, json={"building": "A", "floor": "2", "pose": pose}))
+    await ok(await client.put(f"{MULTI}/homedocks/:current", json={"dock_id": "below"}))
+    assert (await client.get(current)).json()["floor"] == "2"
+    assert robot[Localization].pose.distance_to(Pose(0.5, 0.25)) < 0.1
+    assert (await client.get(f"{MULTI}/homedocks/:current")).json()["data"]["floor"] == "1"
+    for bound in ("above", "below"):  # the first is on its floor; the second on neither: it was pushed there
+        await ok(await client.put(f"{MULTI}/homedocks/:current", json={"dock_id": bound}))
+    assert (await client.get(current)).json()["floor"] == "1"
+    assert robot[Localization].pose.distance_to(Pose(1.0)) < 0.1
 
 
 async def test_map_with_a_dock_far_away_is_loaded(client: httpx.AsyncClient, forward: Forward) -> None:

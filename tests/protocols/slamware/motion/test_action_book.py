@@ -9,8 +9,36 @@ from roboglot.model.components.motion.driving import BASE
 from roboglot.model.errors import Unreachable
 from roboglot.model.robot import Robot
 from roboglot.testing import Forward
+from roboglot.wire.slamware.chapters import motion as wire
 
 ACTIONS = "/api/core/motion/v1/actions"
+
+
+# The fields that the manual's schemas give to options of actions.
+OPTIONS = {
+    wire.MoveOptions: "mode flags yaw acceptable_precision fail_retry_count speed_ratio",
+    wire.GoHome: "flags back_to_landing charging_retry_count move_options",
+    wire.RecoverLocalizationOptions: "area relocalization_options",
+    wire.RelocalizationOptions: "max_recover_time recover_movement_type",
+    wire.MoveToTagOptions: "target tag_type target_relative_pose backward_docking turn_radian tag_ids reflect_tag_num"
+    " dock_retry_count dock_allowance",
+    wire.BackOffFromTagOptions: "backup_mode tag_type backup_distance backward_docking",
+    wire.EnterElevatorOptions: "elevator_id enter_elevator_options",
+    wire.EnterElevator: "elevator_door_flag elevator_stopping_yaw timeout_in_ms use_conservative_mode",
+    wire.LeaveElevatorOptions: "elevator_id target leave_elevator_options",
+    wire.LeaveElevator: "elevator_door_flag timeout_in_ms arrive_door_timeout_in_ms search_path_timeout_in_ms"
+    " on_elevator_door_timeout_in_ms if_need_reach_milestone move_options",
+}
+
+
+def test_no_option_of_the_manual_is_unread() -> None:
+    missing = [
+        f"{options.__name__}.{name}"
+        for options, names in OPTIONS.items()
+        for name in names.split()
+        if name not in options.__struct_fields__
+    ]
+    assert not missing
 
 
 async def for_ever(_: Action) -> None:

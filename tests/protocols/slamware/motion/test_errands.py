@@ -337,6 +337,24 @@ async def test_a_careful_strategy_is_slower(robot: Robot, client: httpx.AsyncCli
     assert (await client.put(f"{url}/:current", json={"strategy": "reckless"})).status_code == 400
 
 
+@pytest.mark.parametrize(("strategy", "ratio"), [("careful", 0), ("default", 0.5)])
+async def test_way_home_is_as_slow_as_asked(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward, strategy: str, ratio: float
+) -> None:
+    await forward(seconds=1)
+    id = await start(client, "MoveToAction", target={"x": 3.0, "y": 0.0})
+    await finish(client, forward, id)
+    await client.put(f"{MOTION}/strategies/:current", json={"strategy": strategy})
+    id = await start(client, "GoHomeAction", gohome_options={"move_options": {"mode": 0, "speed_ratio": ratio}})
+    fastest = 0.0
+    while (await state(client, id))["status"] != 4:
+        await forward(seconds=0.2)
+        fastest = max(fastest, abs(robot[Base].velocity.x))
+    assert await state(client, id) == SUCCESS
+    assert robot[DockContact].docked
+    assert fastest < 0.7  # m/s; without either, 1.2
+
+
 async def test_the_jack_as_an_action(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
     id = await start(client, "JackMoveAction", move_direction="Up")
     assert (await client.get(f"{ACTIONS}/:current")).json()["action_id"] == id

@@ -282,11 +282,12 @@ class StoppingYaw(StrEnum):
 
 
 class EnterElevator(msgspec.Struct):
-    """Options to enter; 0 ms: the robot's own limit. The robot always stops in the middle of the car."""
+    """Options to enter; 0 ms: the robot's own limit. ``use_conservative_mode`` false: not the middle, but deeper."""
 
     elevator_door_flag: Door = Door.FRONT
     elevator_stopping_yaw: StoppingYaw = StoppingYaw.FRONT
     timeout_in_ms: Milliseconds = 0
+    use_conservative_mode: bool | None = None
 
 
 class EnterElevatorOptions(msgspec.Struct):
@@ -297,10 +298,16 @@ class EnterElevatorOptions(msgspec.Struct):
 
 
 class LeaveElevator(msgspec.Struct):
-    """Options to leave; ``if_need_reach_milestone``: go on to the target."""
+    """Options to leave; ``if_need_reach_milestone``: go on to the target. 0 ms: no limit but the robot's own.
+
+    The further limits: until a path is found, until the robot is out of the door, and on the sill.
+    """
 
     elevator_door_flag: Door = Door.FRONT
     timeout_in_ms: Milliseconds = 0
+    search_path_timeout_in_ms: Milliseconds = 0
+    arrive_door_timeout_in_ms: Milliseconds = 0
+    on_elevator_door_timeout_in_ms: Milliseconds = 0
     if_need_reach_milestone: bool = False
     move_options: MoveOptions | None = None
 

@@ -7,11 +7,11 @@ the base from a part ends the errand. Knows no wire format.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.system.lease import ERRAND
-from roboglot.model.errors import Expired
+from roboglot.model.errors import Expired, RobotError
 from roboglot.model.events import ActionChanged
 from roboglot.model.robot import Robot
 
@@ -26,11 +26,14 @@ class Errand:
         self.robot = robot
         self._action = action
 
-    async def do(self, part: Action, *, within: float | None = None) -> None:
+    async def do(
+        self, part: Action, *, within: float | None = None, watch: Coroutine[object, None, RobotError] | None = None
+    ) -> None:
         """Wait for ``part``, report it as the errand's progress, and raise its error.
 
         The errand can be paused as long as its part can, and a part that begins during a pause is paused, too. After
-        ``within`` s the part is cancelled, with Expired. If another client cancels it, so is the errand.
+        ``within`` s the part is cancelled, with Expired; when ``watch`` returns, with its error. If another client
+        cancels it, so is the errand.
         """
         self._action.report(part)
         self._action.pausable = part.pausable
@@ -41,13 +44,11 @@ class Errand:
         stop = self.robot.events.listen(ActionChanged, lambda event: self._pass_on(event, part))
         try:
             if within is None:
-                await part.done()
+                problem = await _end_of(part, watch)
             else:
-                await self.robot.clock.wait_for(part.done(), within)
+                problem = await self.robot.clock.wait_for(_end_of(part, watch), within)
         except TimeoutError:
-            part.cancel("it took too long")
-            await part.done()
-            raise Expired(f"{part.name} took longer than {within:g} s") from None
+            problem = Expired(f"{part.name} took longer than {within:g} s")
         except asyncio.CancelledError:
             part.cancel(self._action.reason)
             if self._action.status is ActionStatus.CANCELING:  # otherwise the loop is closing and no clock moves
@@ -56,6 +57,10 @@ class Errand:
         finally:
             stop()
             self._action.pausable = True  # what comes between two parts stands still
+        if problem is not None:
+            part.cancel(str(problem))
+            await part.done()
+            raise problem
         if part.status is ActionStatus.CANCELED:
             self._action.cancel(part.reason)
             raise asyncio.CancelledError
@@ -66,6 +71,20 @@ class Errand:
         """Pause and resume the part with the errand."""
         if event.action is self._action and part.paused is not self._action.paused:
             (part.pause if self._action.paused else part.resume)()
+
+
+async def _end_of(part: Action, watch: Coroutine[object, None, RobotError] | None) -> RobotError | None:
+    """Return at the end of ``part``, or when ``watch`` returns an error: with that."""
+    if watch is None:
+        await part.done()
+        return None
+    tasks = asyncio.ensure_future(part.done()), asyncio.ensure_future(watch)
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        return None if tasks[0].done() else tasks[1].result()
+    finally:
+        for task in tasks:
+            task.cancel()
 
 
 def run_errand(

@@ -41,7 +41,8 @@ async def head_home(errand: Errand, wanted: GoHome) -> None:
     how = wanted.move_options or MoveOptions()
     robot = errand.robot
     docking, stays_before = robot[Docking], wanted.flags == "no_dock"
-    if stays_before or how.mode:
+    slower = docking.home is not None and navigation_options(robot, how, None).speed_ratio < 1.0
+    if stays_before or how.mode or slower:
         if DockContact in robot and robot[DockContact].docked:
             return
         await _to_landing(errand, docking.home, how)

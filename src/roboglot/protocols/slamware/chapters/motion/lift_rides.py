@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 
 from roboglot.confirmation import confirmed
 from roboglot.model.actions import Action, ActionStatus
@@ -16,8 +17,9 @@ from roboglot.model.components.mapping.mapping import abort_with_map
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound, RobotError, Unreachable
-from roboglot.model.geometry import Point, Pose, wrap_angle
+from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.chapters.motion.car_exit import CROSS_SECONDS, CarExit
 from roboglot.protocols.slamware.chapters.motion.errands import PART, Errand, run_errand
 from roboglot.protocols.slamware.chapters.motion.home_docks import NAME
 from roboglot.protocols.slamware.chapters.motion.homing import head_home
@@ -46,8 +48,6 @@ from roboglot.wire.slamware.chapters.motion import (
     StoppingYaw,
 )
 from roboglot.wire.slamware.chapters.platform import ElevatorEvent
-
-CROSS_SECONDS = 120.0  # s, unless the client sets a limit
 
 
 def multi_floor_move(context: Context, options: MultiFloorMoveOptions) -> Action:
@@ -189,7 +189,11 @@ def enter_elevator(context: Context, options: EnterElevatorOptions) -> Action:
         note(ElevatorEvent.WAIT_ELEVATOR)
         note(ElevatorEvent.ENTER_ELEVATOR)
         with _noting(note, ElevatorEvent.ENTER_ELEVATOR_OCCUPIED, ElevatorEvent.ENTER_ELEVATOR_FAILED):
-            into = navigate(errand.robot, [elevator.inside.point], MoveOptions(), source=PART)
+            goal = elevator.inside.point
+            if how.use_conservative_mode is False:
+                rear = how.elevator_door_flag is Door.REAR
+                goal = elevator.deep(errand.robot.description.radius, rear=rear)
+            into = navigate(errand.robot, [goal], MoveOptions(), source=PART)
             await errand.do(into, within=how.timeout_in_ms / 1000 or CROSS_SECONDS)
         note(ElevatorEvent.IN_ELEVATOR)
         note(ElevatorEvent.TURNING_ROUND_IN_ELEVATOR)
@@ -226,16 +230,16 @@ def leave_elevator(context: Context, options: LeaveElevatorOptions) -> Action:
 
     async def work(errand: Errand) -> None:
         await settle(context.robot)
-        elevator = _elevator(context, options.elevator_id)  # on the map that is in use by now
-        waiting = elevator.waiting(rear=how.elevator_door_flag is Door.REAR)
+        find = partial(_elevator, context, options.elevator_id)
+        find()
         note(ElevatorEvent.LEAVE_ELEVATOR)
         with _noting(note, ElevatorEvent.LEAVE_ELEVATOR_OCCUPIED, ElevatorEvent.LEAVE_ELEVATOR_FAILED):
-            out = navigate(errand.robot, [waiting.point], MoveOptions(), source=PART)
-            await errand.do(out, within=how.timeout_in_ms / 1000 or CROSS_SECONDS)
+            await CarExit(errand, find, how).drive_out()
         note(ElevatorEvent.OUT_OF_ELEVATOR)
         if options.target is not None and how.if_need_reach_milestone:
-            goal = Point(options.target.x, options.target.y)
-            await errand.do(navigate(errand.robot, [goal], onward, source=PART))
+            goal = pose_of(options.target)
+            yaw = goal.yaw if onward.has("with_yaw") and onward.yaw is None else None
+            await errand.do(navigate(errand.robot, [goal.point], onward, source=PART, yaw=yaw))
 
     action = run_errand(context.robot, "leave elevator", work, options.elevator_id)
     return abort_with_map(context.robot, action, ActionStatus.EXECUTING) if options.target is not None else action

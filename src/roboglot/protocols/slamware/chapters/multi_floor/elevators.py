@@ -13,7 +13,7 @@ import msgspec
 
 from roboglot.model.components.mapping.annotations import Annotations, Area, AreaKind, MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
-from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.model.geometry import Point, Pose, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
@@ -27,6 +27,7 @@ from roboglot.wire.slamware.geometry import Pose3D
 
 API = "/api/multi-floor/map/v1/elevators"
 SILL, WAITING = 0.4, 1.0  # m, unless the metadata give them
+WALL_GAP = 0.1  # m between the car's wall and a robot deep inside
 
 
 class DoorType(StrEnum):
@@ -69,6 +70,11 @@ class Elevator:
         """Pose in the middle of the car, facing away from the front door."""
         a, b = self.area.start, self.area.end
         return Pose((a.x + b.x) / 2, (a.y + b.y) / 2, self.inward)
+
+    def deep(self, radius: float, *, rear: bool) -> Point:
+        """Return the innermost place for a hull of ``radius`` (m) that came in by a door: at least the middle."""
+        depth = max(0.0, self.area.start.distance_to(self.area.end) / 2 - radius - WALL_GAP)
+        return self.inside.compose(Pose(-depth if rear else depth)).point
 
     def waiting(self, *, rear: bool = False) -> Pose:
         """Return the pose in front of a door, facing it."""

@@ -199,15 +199,17 @@ def get_current_home_dock(context: Context) -> BoundDock:
 
 @TABLE.on(f"PUT {MAP}/homedocks/:current", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def set_current_home_dock(context: Context, body: DockChoice) -> None:
-    """Bind the robot to a dock. If that is on another floor, the robot is taken to be on it, with its map."""
+    """Bind the robot to a dock. If that is on neither its floor nor the start floor, it is taken to be on the dock."""
     found = _find_dock(context, body.dock_id)
     if found is None:
         raise NotFound(f"the loaded map has no dock {body.dock_id}")
     floor, dock = found
+    start = context.maps.start_floor
+    known = {context.maps.current, start and start.name}
     settings = context.robot[Settings]
     bound = settings.get(BOUND)
     await settings.put(BOUND, dock.id)
-    if floor.name != context.maps.current:
+    if floor.name not in known:
         try:
             await context.maps.enter(floor.name.building, floor.name.floor, dock.pose, stop=context.actions.abort)
         except RobotError:

@@ -12,11 +12,12 @@ from roboglot.model.components.mapping.annotations import MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.system.settings import Settings
-from roboglot.model.errors import DockNotFound, InvalidGoal, NotFound
+from roboglot.model.errors import DockNotFound, InvalidGoal, NotFound, RobotError
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.home_docks import (
+    BOUND,
     NAME,
     Docks,
     change_docks,
@@ -32,6 +33,7 @@ from roboglot.wire.slamware.chapters.slam.localization import Registration
 from roboglot.wire.slamware.geometry import Pose3D
 
 API = "/api/core/slam/v1"
+SAME_PLACE = 0.05  # m within which a home pose is that of a dock on the map
 
 
 def _entered(robot: Robot, entry: PoseEntry) -> PointOfInterest:
@@ -51,10 +53,25 @@ def get_home_pose(context: Context) -> Pose3D:
 
 @TABLE.on(f"PUT {API}/homepose", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def set_home_pose(context: Context, body: Pose3D) -> bool:
-    """Set the place of the home dock, by the robot's pose when docked."""
+    """Choose the dock at this place as home, or move the home dock here; by the robot's pose when docked."""
     robot, pose = context.robot, pose_of(body)
-    moved = replace(home_dock(robot) or own_dock(robot, pose), pose=pose)
-    await change_docks(robot, lambda docks: tuple(moved if dock.id == moved.id else dock for dock in docks or (moved,)))
+    home = home_dock(robot) or own_dock(robot, pose)
+    at = [dock for dock in known_docks(robot) if dock.pose.distance_to(pose) < SAME_PLACE]
+    chosen = at[0] if at and home not in at else home
+    moved, bound = replace(chosen, pose=pose), robot[Settings].get(BOUND)
+
+    def edit(docks: Docks) -> Docks:
+        if chosen is home:
+            return tuple(moved if dock.id == moved.id else dock for dock in docks or (moved,))
+        return (moved, *(dock for dock in docks if dock.id != moved.id))
+
+    if bound == home.id:
+        await robot[Settings].put(BOUND, chosen.id)
+    try:
+        await change_docks(robot, edit)
+    except RobotError:
+        await robot[Settings].keep(BOUND, bound)
+        raise
     return True
 
 
