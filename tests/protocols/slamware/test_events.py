@@ -16,12 +16,14 @@ from roboglot.model.events import (
     BatteryChanged,
     BumperPressed,
     DockContactChanged,
+    LocalizationRecovered,
     ModuleRestarted,
     PathBlocked,
     Rebooted,
     Rebooting,
+    RecoveryMeans,
 )
-from roboglot.model.geometry import Path
+from roboglot.model.geometry import Path, Pose
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.platform.event_log import EVENTS_MAX
 from roboglot.protocols.slamware.config import SlamwareConfig
@@ -53,6 +55,20 @@ async def test_dock_charge_and_bumper(bare: Robot, bare_client: httpx.AsyncClien
         "BUMPER_TRIGGERED",
     ]
     assert await read(bare_client) == []
+
+
+@pytest.mark.parametrize(
+    ("means", "later", "reset"),
+    [(RecoveryMeans.GIVEN, 0.0, 1), (RecoveryMeans.GIVEN, 5.0, 0), (RecoveryMeans.NEARBY, 0.0, 0)],
+)
+async def test_lost_robot_pushed_onto_dock_is_reset(
+    bare: Robot, bare_client: httpx.AsyncClient, forward: Forward, means: RecoveryMeans, later: float, reset: int
+) -> None:
+    await forward(seconds=1)
+    bare.events.publish(DockContactChanged(stamp=1.0, docked=True))
+    await forward(seconds=later)
+    bare.events.publish(LocalizationRecovered(stamp=1.0 + later, means=means, pose=Pose(), seconds=3.0))
+    assert (await read(bare_client)).count("RESET_MAP_TO_DOCK") == reset
 
 
 async def test_unread_events_are_bounded(bare: Robot, bare_client: httpx.AsyncClient) -> None:

@@ -366,3 +366,35 @@ async def test_without_a_place_it_is_on_no_floor(bare_client: httpx.AsyncClient)
     reply = await bare_client.get("/api/multi-floor/map/v1/floors/:current")
     assert reply.status_code == 501
     assert "localization" in reply.text
+
+
+@pytest.mark.parametrize("level", FaultLevel)
+@pytest.mark.parametrize("name", ["not localized", "battery low", "cliff", "brake released"])
+async def test_lasting_fault_is_one_level_in_all_answers(
+    bare: Robot, bare_client: httpx.AsyncClient, forward: Forward, name: str, level: FaultLevel
+) -> None:
+    """The model's level may be another than the vendor's."""
+    bare.add(Health, Health(bare.clock, bare.events))
+    bare[Health].set(name, True, "base", level)
+    await forward(seconds=3)
+    health = await get(bare_client, f"{SYSTEM}/robot/health")
+    assert isinstance(health, dict)
+    severe = health["hasError"] or health["hasFatal"]
+    events = [event["type"] for event in (await bare_client.get("/api/platform/v1/events")).json()]
+    assert events == ["DEVICE_ERROR"] * severe
+
+
+async def test_momentary_doubt_is_no_device_error(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A single scan that fits badly, as on arrival at another floor, does not stop the robot; lasting doubt does."""
+    await forward(seconds=1)
+    await client.get("/api/platform/v1/events")
+    for seconds, stage in ((1.0, "IDLE"), (3.0, "DEVICE_ERROR")):
+        with monkeypatch.context() as patch:
+            patch.setattr(type(robot[Localization]), "quality", property(lambda _: 0.1))
+            await forward(seconds=seconds)
+            assert (await client.get("/api/delivery/v1/stage")).json()["stage"] == stage
+        await forward(seconds=3)
+        events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
+        assert events == ["DEVICE_ERROR"] * (stage == "DEVICE_ERROR")

@@ -129,8 +129,10 @@ async def test_a_lost_robot_lets_orders_wait(
             localization.set_pose(here)
             localization.enable(True)
             assert (await screen.client.post(f"{slam}/status/:reset")).json() is True
+    await screen.events()
     await forward(seconds=60)
     assert (await screen.task(second))["status"] == "SUCCEEDED"
+    assert (await screen.events()).count("RESET_MAP_TO_DOCK") == (helped_by == "dock")
 
 
 @pytest.mark.slow  # a long story

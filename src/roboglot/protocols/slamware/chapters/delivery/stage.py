@@ -5,7 +5,7 @@ from __future__ import annotations
 from roboglot.model.actions import Action
 from roboglot.model.components.logistics.delivery import Delivery, Order, OrderStage, Phase
 from roboglot.model.components.mapping.places import Places
-from roboglot.model.components.system.health import FaultLevel, Health
+from roboglot.model.components.system.health import Health
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.delivery.vocabulary import (
     STAGES,
@@ -15,7 +15,7 @@ from roboglot.protocols.slamware.chapters.delivery.vocabulary import (
     task_of,
     task_request_of,
 )
-from roboglot.protocols.slamware.chapters.system.health import record_of
+from roboglot.protocols.slamware.chapters.system.fault_numbers import is_error, record_of
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.slamware.chapters.delivery import DeviceError, Pickup, StageInfo, TaskStage
@@ -73,5 +73,6 @@ def _of_order(context: Context, order: Order, floor: str) -> TaskStage:
 def _errors(context: Context) -> list[DeviceError]:
     if Health not in context.robot:
         return []
-    records = [record_of(fault) for fault in context.robot[Health].faults if fault.level >= FaultLevel.ERROR]
+    now = context.robot.clock.time()
+    records = [record_of(fault) for fault in context.robot[Health].faults if is_error(fault, now)]
     return [DeviceError(r.component, r.error_code, r.level, r.message) for r in records]

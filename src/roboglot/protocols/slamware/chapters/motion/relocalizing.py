@@ -20,7 +20,6 @@ from roboglot.wire.slamware.chapters.motion import (
     RecoverMovement,
     RelocalizationOptions,
 )
-from roboglot.wire.slamware.chapters.platform import GeneralEvent
 
 RECOVER_SECONDS = 30.0  # s, unless the client sets a limit
 TURN = math.radians(60)  # between two searches
@@ -59,6 +58,7 @@ def manual_relocalization(context: Context, _: NoOptions) -> Action:
 
     async def work(errand: Errand) -> None:
         robot = errand.robot
+        begun = robot.clock.time()
         while not _docked(context) or (dock := home_dock(robot)) is None:
             try:
                 await errand.do(robot[Localization].relocalize(source=PART), within=PLACE_SECONDS)
@@ -67,7 +67,7 @@ def manual_relocalization(context: Context, _: NoOptions) -> Action:
                 await robot.clock.sleep(PAUSE_SECONDS)
         async with confirmed():
             robot[Localization].set_pose(dock.pose)
-        context.events.note(GeneralEvent.RESET_MAP_TO_DOCK)
+        context.events.note_reset(begun)
 
     return run_errand(context.robot, "manual relocalization", work)
 

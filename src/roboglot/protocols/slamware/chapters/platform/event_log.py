@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,7 +12,6 @@ from roboglot.model.clock import Timer
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.motion.navigation import NAVIGATE, NavigationFeedback
 from roboglot.model.components.system.firmware import FirmwareState
-from roboglot.model.components.system.health import FaultLevel
 from roboglot.model.errors import Blocked, DockNotFound, Unreachable
 from roboglot.model.events import (
     ActionChanged,
@@ -22,11 +22,12 @@ from roboglot.model.events import (
     CorridorEntered,
     DeliveryReported,
     DockContactChanged,
-    FaultRaised,
     FirmwareChanged,
+    LocalizationRecovered,
     LoopClosed,
     PathBlocked,
     Rebooting,
+    RecoveryMeans,
     ShuttingDown,
 )
 from roboglot.model.robot import Robot
@@ -36,6 +37,7 @@ from roboglot.protocols.slamware.chapters.motion.errands import PART
 from roboglot.protocols.slamware.chapters.motion.occupancy import stands_in_something
 from roboglot.protocols.slamware.chapters.multi_floor.elevator_events import RideEvents
 from roboglot.protocols.slamware.chapters.system.charging_monitor import ChargingWatch
+from roboglot.protocols.slamware.chapters.system.fault_alarms import FaultAlarms
 from roboglot.protocols.slamware.vocabulary import action_word, milliseconds
 from roboglot.wire.slamware.chapters.delivery import DeliveryEvent
 from roboglot.wire.slamware.chapters.platform import ElevatorEvent, GeneralEvent, RobotEvent
@@ -46,6 +48,7 @@ DRIVES = (NAVIGATE, "dock", "sweep")  # actions that plan routes
 KEPT_AT_RESTARTS = (DeliveryEvent.ROBOT_REBOOT, GeneralEvent.POWER_OFF)  # clients read them after the restart
 BLOCKED_AFTER = 180.0  # s in one place before ROBOT_BLOCKED
 OCCUPIED_AGAIN = 5.0  # s until the same obstacle is reported again
+TOGETHER = 0.5  # s
 SAME_PLACE = 0.5  # m within which it is the same one
 
 
@@ -63,6 +66,8 @@ class EventLog:
         self._occupied: PathBlocked | None = None  # the last one reported
         self._rides = RideEvents()
         self._dock = ChargingWatch(robot, lambda: self.note(GeneralEvent.CHARGING_BASE_FAILED))
+        self._faults = FaultAlarms(robot, lambda stamp: self.note(GeneralEvent.DEVICE_ERROR, stamp))
+        self._docked_at = self._given_at = self._reset_at = -math.inf  # robot time, s: contact, pose of a lost robot
         self._looked = 0  # the drive for which the robot's own place has been checked
         self._endings: list[Callable[[], None]] = []
 
@@ -72,6 +77,7 @@ class EventLog:
         self._charging = Battery in self._robot and self._robot[Battery].state.charging
         self._endings = [
             listen(DockContactChanged, self._dock_changed),
+            listen(LocalizationRecovered, self._recovered),
             listen(BatteryChanged, self._battery_changed),
             listen(BumperPressed, lambda event: self.note(GeneralEvent.BUMPER_TRIGGERED, event.stamp)),
             listen(PathBlocked, self._path_blocked),
@@ -81,18 +87,19 @@ class EventLog:
             listen(LoopClosed, lambda event: self.note(GeneralEvent.MAP_LOOP_CLOSURE, event.stamp)),
             listen(CorridorEntered, lambda e: self.note(GeneralEvent.PASS_THE_NARROW_CORRIDOR, e.stamp)),
             listen(BrakeChanged, self._brake_changed),
-            listen(FaultRaised, self._fault_raised),
             listen(FirmwareChanged, self._firmware_changed),
             listen(DeliveryReported, self._delivery_reported),
             listen(Rebooting, lambda event: self.note(DeliveryEvent.ROBOT_REBOOT, event.stamp)),
         ]
         self._dock.start()
+        self._faults.start()
 
     def close(self) -> None:
         """Stop listening."""
         for end in self._endings:
             end()
         self._dock.close()
+        self._faults.close()
         self._unblock()
 
     def read(self) -> list[RobotEvent]:
@@ -127,6 +134,25 @@ class EventLog:
 
     def _dock_changed(self, event: DockContactChanged) -> None:
         self.note(GeneralEvent.ON_DOCK if event.docked else GeneralEvent.OFF_DOCK, event.stamp)
+        if event.docked:
+            self._docked_at = self._robot.clock.time()
+            self._look_for_reset()
+
+    def _recovered(self, event: LocalizationRecovered) -> None:
+        if event.means is RecoveryMeans.GIVEN:
+            self._given_at = self._robot.clock.time()
+            self._look_for_reset()
+
+    def _look_for_reset(self) -> None:
+        """Note the reset of a lost robot that is pushed onto its dock: contact and pose come together."""
+        if abs(self._given_at - self._docked_at) < TOGETHER:
+            self.note_reset(self._docked_at)
+
+    def note_reset(self, since: float) -> None:
+        """Record that the robot, pushed onto its dock, took its pose; not if recorded ``since`` (robot time, s)."""
+        if self._reset_at < since:
+            self._reset_at = self._robot.clock.time()
+            self.note(GeneralEvent.RESET_MAP_TO_DOCK)
 
     def _battery_changed(self, event: BatteryChanged) -> None:
         if event.charging != self._charging:
@@ -136,10 +162,6 @@ class EventLog:
     def _brake_changed(self, event: BrakeChanged) -> None:
         if event.released:
             self.note(GeneralEvent.BRAKE_RELEASED, event.stamp)
-
-    def _fault_raised(self, event: FaultRaised) -> None:
-        if event.fault.level >= FaultLevel.ERROR:
-            self.note(GeneralEvent.DEVICE_ERROR, event.stamp)
 
     def _firmware_changed(self, event: FirmwareChanged) -> None:
         upgrading = event.progress.state is FirmwareState.INSTALLING
