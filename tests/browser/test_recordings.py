@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import math
+import re
 from typing import Any
 
 import pytest
 
+from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_library import MapLibrary
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.geometry import Point, Pose
 from roboglot.recording.reader import read_recording
 from tests.browser.served import OpenConsole, Served, becomes
 
@@ -38,11 +43,49 @@ async def test_a_recording_is_begun_marked_and_ended(served: Served, open_consol
         await row.locator("text=Download").click()
     loaded = await (await loading.value).path()
     assert await asyncio.to_thread(loaded.read_bytes) == await asyncio.to_thread(file.read_bytes)
-    await row.locator("text=Play back").click()
+    await row.locator("text=As a robot").click()
     await row.locator(f"text=recording:{file}").wait_for()
     await row.locator("text=Remove").click()  # the question is answered above
     await page.wait_for_selector("text=Nothing has been recorded yet.")
     assert not file.exists()
+
+
+async def test_a_recording_is_watched_where_it_was_made(served: Served, open_console: OpenConsole) -> None:
+    page = await open_console(view="recordings")
+    robot = served.robot
+
+    async def shows(place: Pose) -> bool:
+        """Tell whether the page shows the robot within 5 cm of a place."""
+        found = re.search(r"x (\S+) · y (\S+) m", await page.inner_text("aside"))
+        return found is not None and math.hypot(float(found[1]) - place.x, float(found[2]) - place.y) < 0.05
+
+    await page.click("button:has-text('Record')")
+    await page.wait_for_selector("text=End the recording")
+    start = robot[Localization].pose
+    await served.clock.advance(2.0)
+    page.on("dialog", lambda dialog: asyncio.ensure_future(dialog.accept("it sets off")))
+    async with page.expect_response("**/api/recording"):
+        await page.click("button:has-text('Mark')")
+    driving = robot[Navigation].navigate_to([Point(1.5, 0.0)], NavigationOptions())
+    while not driving.status.ended:
+        await served.clock.advance(0.5)
+    end = robot[Localization].pose
+    await served.clock.advance(1.0)
+    await page.click("text=End the recording")
+
+    await page.click("main li button:has-text('Watch')")
+    await page.wait_for_selector("text=This moves no robot.")
+    await page.click("button:has-text('0:02 it sets off')")
+    await page.click("[aria-label=Pause]")
+    await becomes(lambda: shows(start), True)
+    assert "done" not in await page.inner_text("aside")
+    seconds = await page.locator(".player input").get_attribute("max")
+    await page.fill(".player input", seconds or "")
+    await becomes(lambda: shows(end), True)
+    await page.wait_for_selector("aside li:has-text('navigate to') >> text=done")
+    await page.click("text=All recordings")
+    await page.click("main li button:has-text('Remove')")
+    await page.wait_for_selector("text=Nothing has been recorded yet.")
 
 
 async def test_stored_map_is_replaced_only_when_confirmed(served: Served, open_console: OpenConsole) -> None:

@@ -90,9 +90,22 @@ def test_pages_load_nothing_from_elsewhere() -> None:
 
 
 def test_the_page_is_small_enough() -> None:
-    names = ("camera", "class", "clock", "maps", "orders", "plots", "recordings", "robots", "sign", "wire", "world")
+    names = (
+        "camera",
+        "class",
+        "clock",
+        "maps",
+        "orders",
+        "plots",
+        "recordings",
+        "robots",
+        "sign",
+        "watch",
+        "wire",
+        "world",
+    )
     views = (f"/views/{name}.js" for name in names)
-    shown = (*views, "/copies.js", "/vendor/uplot.mjs", "/vendor/uplot.css")  # loaded when shown
+    shown = (*views, "/copies.js", "/excerpts.js", "/vendor/uplot.mjs", "/vendor/uplot.css")  # loaded when shown
     later = (*shown, "/words/server.zh.json")  # loaded after the page
     sent = {
         path: asset

@@ -154,8 +154,13 @@ class Api:
                 await answer_json(send, await recordings.all())
             case "GET", ["recordings", file]:
                 await recordings.kept.send(file, send)
-            case "GET", ["recordings", one, "compared", other, *robot] if len(robot) < 2:
-                await recordings.kept.send_comparison(one, other, "".join(robot), send)
+            case "GET", ["recordings", file, "watch"]:
+                await answer_json(send, await recordings.watching.outline(file))
+            case "GET", ["recordings", file, "watch", robot, since, seconds]:
+                excerpt = await recordings.watching.excerpt(file, robot, _seconds(since), _seconds(seconds))
+                await answer(send, 200, b"application/octet-stream", excerpt, [(b"cache-control", b"no-store")])
+            case "GET", ["recordings", one, "compared", other, *rest] if len(rest) < 2:
+                await recordings.kept.send_comparison(one, other, "".join(rest), send)
             case _:
                 raise _nothing_here()
 
@@ -261,3 +266,9 @@ def _whole(text: str) -> int:
     if not text.isdecimal() or len(text) > 12:
         raise NotFound(f"{text!r} is not the number of an exchange")
     return int(text)
+
+
+def _seconds(milliseconds: str) -> float:
+    if not milliseconds.isdecimal() or len(milliseconds) > 12:
+        raise BadParameters(f"{milliseconds!r} is not a time in whole milliseconds")
+    return int(milliseconds) / 1000.0

@@ -23,6 +23,8 @@ READS = {
     "/api/recordings": "The recordings in the data folder",
     "/api/recordings/{file}": "A file of a recording",
     "/api/recordings/{file}/compared/{other}": "A page that compares two recordings; with /{name}, of one robot",
+    "/api/recordings/{file}/watch": "Length, robots and marks of a recording",
+    "/api/recordings/{file}/watch/{name}/{since}/{length}": "What a robot saw and did then; both times in ms",
     "/api/blocks": "Every function of robot programs for an editor: names, types, ranges, choices",
     "/api/lessons": "The missions of the studio",
     "/api/robots": "All robots with their poses",

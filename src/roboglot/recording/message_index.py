@@ -77,6 +77,22 @@ class MessageIndex:
         self._chunks = sorted(found, key=lambda chunk: chunk.first)
         self._ends = list(accumulate((chunk.last for chunk in self._chunks), max))  # of each chunk and all before it
 
+    @property
+    def first(self) -> int:
+        """Time of the first message, ns since 1970."""
+        return self._chunks[0].first
+
+    @property
+    def end(self) -> int:
+        """Time of the last message, ns since 1970."""
+        return self._ends[-1]
+
+    def only(self, topics: Collection[int]) -> Iterator[TimedMessage]:
+        """Yield all messages of these topics, reading only chunks with one. Raises BadRecording, OSError."""
+        for chunk in self._chunks:
+            if not chunk.topics.isdisjoint(topics):
+                yield from (message for message in self._read(chunk) if message.topic in topics)
+
     def play(self, since: int) -> Iterator[Sequence[TimedMessage]]:
         """Yield all messages at or after ``since`` (ns since 1970) in batches, ordered by time.
 

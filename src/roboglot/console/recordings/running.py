@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import msgspec
 
 from roboglot.console.recordings.kept import RecordingFolder, StoredRecording
+from roboglot.console.recordings.watching import Watching
 from roboglot.model.errors import Refused
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ class Recordings:
     def __init__(self, data: Path, recorder: Callable[[], Recorder]) -> None:
         self._folder, self._recorder = data / FOLDER, recorder
         self.kept = RecordingFolder(self._folder)
+        self.watching = Watching(self.kept)
 
     @property
     def on(self) -> bool:

@@ -184,7 +184,8 @@ export function say(text, bad = false) {
  * @param {string} path @param {object} [wish] */
 export async function fetched(path, wish) {
   const reply = await fetch(path, wish ? { method: "POST", body: JSON.stringify(wish) } : {}).catch(() => { throw new Error(t("link.lost")); });
-  const words = /json/.test(reply.headers.get("content-type") ?? "") ? await reply.json() : await reply.text();
+  const kind = reply.headers.get("content-type") ?? "";
+  const words = await (/json/.test(kind) ? reply.json() : /octet/.test(kind) ? reply.arrayBuffer() : reply.text());
   if (!reply.ok) throw new Error(words.error ?? reply.statusText);
   return words;
 }

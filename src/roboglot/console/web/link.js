@@ -212,16 +212,23 @@ function receive(message) {
   }
 }
 
+/** A frame's head and what follows it. @param {ArrayBuffer} data */
+export function opened(data) {
+  const length = new DataView(data).getUint16(0, true);
+  return { head: JSON.parse(new TextDecoder().decode(new Uint8Array(data, 2, length))), payload: data.slice(2 + length) };
+}
+
+/** A map with its cells. @param {any} head @param {ArrayBuffer} payload */
+export async function mapped(head, payload) {
+  const stream = new Blob([payload]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return { ...head, cells: new Uint8Array(await new Response(stream).arrayBuffer()) };
+}
+
 /** @param {ArrayBuffer} data */
 async function receiveFrame(data) {
-  const length = new DataView(data).getUint16(0, true);
-  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 2, length)));
-  const payload = data.slice(2 + length);
+  const { head, payload } = opened(data);
   if (head.robot !== current.value) return;
   if (head.kind === "scan") scan.value = { ...head, ranges: new Uint16Array(payload) };
   else if (head.kind === "path") path.value = new Float32Array(payload);
-  else if (head.kind === "map") {
-    const stream = new Blob([payload]).stream().pipeThrough(new DecompressionStream("deflate"));
-    grid.value = { ...head, cells: new Uint8Array(await new Response(stream).arrayBuffer()) };
-  }
+  else if (head.kind === "map") grid.value = await mapped(head, payload);
 }

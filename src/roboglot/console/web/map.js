@@ -14,11 +14,12 @@ let fitted = "";
 const anchor = () => state.value?.anchor ?? null;
 export const toWorld = (p) => outOf(anchor() ?? [0, 0, 0], p);
 
-function zoom(factor, at = null) {
-  const { x, y, scale } = camera.value;
+/** @param {number} factor @param {number[] | null} [at] @param {typeof camera} [view] */
+export function zoom(factor, at = null, view = camera) {
+  const { x, y, scale } = view.value;
   const now = Math.min(SCALE_MAX, Math.max(SCALE_MIN, scale * factor));
   const [px, py] = at ?? [x, y];
-  camera.value = { x: px - (px - x) * scale / now, y: py - (py - y) * scale / now, scale: now };
+  view.value = { x: px - (px - x) * scale / now, y: py - (py - y) * scale / now, scale: now };
 }
 
 /** Show everything that is known. @param {{width: number, height: number}} size */
@@ -150,12 +151,12 @@ function paintOverlay(chart, c, { spots = [], arrow, measure, rectangle, line })
 }
 
 /** Pointers on the canvas: one is the tool's, two pinch, the right button and the wheel move and zoom.
- * @param {HTMLCanvasElement} canvas @param {() => any} tool */
-function pointers(canvas, tool) {
+ * @param {HTMLCanvasElement} canvas @param {() => any} tool @param {{view: typeof camera, follows: typeof following}} [what] moved by them */
+export function pointers(canvas, tool, { view, follows } = { view: camera, follows: following }) {
   const held = new Map();
   let began = null, pinch = null, panning = false;
   const place = (event) => {
-    const box = canvas.getBoundingClientRect(), { x, y, scale } = camera.value;
+    const box = canvas.getBoundingClientRect(), { x, y, scale } = view.value;
     return [x + (event.clientX - box.left - box.width / 2) / scale, y - (event.clientY - box.top - box.height / 2) / scale];
   };
   const spread = () => {
@@ -163,9 +164,9 @@ function pointers(canvas, tool) {
     return { gap: Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY), x: (a.clientX + b.clientX) / 2, y: (a.clientY + b.clientY) / 2 };
   };
   const shift = (dx, dy) => {
-    following.value = false;
-    const { x, y, scale } = camera.value;
-    camera.value = { x: x - dx / scale, y: y + dy / scale, scale };
+    follows.value = false;
+    const { x, y, scale } = view.value;
+    view.value = { x: x - dx / scale, y: y + dy / scale, scale };
   };
   canvas.onpointerdown = (event) => {
     canvas.setPointerCapture(event.pointerId);
@@ -181,7 +182,7 @@ function pointers(canvas, tool) {
     held.set(event.pointerId, event);
     if (held.size === 2 && pinch) {
       const now = spread();
-      zoom(now.gap / pinch.gap);
+      zoom(now.gap / pinch.gap, null, view);
       shift(now.x - pinch.x, now.y - pinch.y);
       pinch = now;
     } else if (panning) shift(event.clientX - before.clientX, event.clientY - before.clientY);
@@ -196,7 +197,7 @@ function pointers(canvas, tool) {
   };
   canvas.onpointerup = canvas.onpointercancel = end;
   canvas.oncontextmenu = (event) => event.preventDefault();
-  canvas.onwheel = (event) => { event.preventDefault(); zoom(Math.exp(-event.deltaY * 0.0015), following.value ? null : place(event)); };
+  canvas.onwheel = (event) => { event.preventDefault(); zoom(Math.exp(-event.deltaY * 0.0015), follows.value ? null : place(event), view); };
 }
 
 /** `tool`: {drag(from, to), done(from, to | null), drop()}; `overlay`: what it shows. @param {any} props */

@@ -1,10 +1,11 @@
-// The recordings in the data folder: play back, compare, download, delete; and the one that is being made.
+// The recordings in the data folder: watch, play back, compare, download, delete; and the one that is being made.
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
 import { Button, duration, fetched, html, language, say, t } from "../base.js";
 import { copied } from "../copies.js";
 import { connections, current, recording } from "../link.js";
 import { Recording } from "./recording.js";
+import { Watch, watch, watchedFile } from "./watch.js";
 
 const LOOK = 3000; // ms, while one is being made
 const all = signal(/** @type {any[] | null} */ (null));
@@ -58,7 +59,7 @@ function Row({ one }) {
   const length = one.running ? t("recordings.running") : one.seconds === null ? t("recordings.cut") : duration(one.seconds);
   return html`<li class="card"><h2>${one.file}</h2>
     <p class=${(one.seconds === null && !one.running) || one.damage ? "warned" : "muted"}>${[when, one.damage ? t("recordings.damaged", { why: one.damage }) : length, !one.running && `${megabytes} MB`, one.robots.length && `${t("robot")} ${one.robots.join(", ")}`, one.world].filter(Boolean).join(" · ")}</p>
-    ${!one.running && html`<div class="buttons">${!one.damage && html`<${Button} icon="play" label=${t("recordings.play")} of=${one.file} on=${shown.value === one.file} onClick=${() => { shown.value = shown.value === one.file ? "" : one.file; }} />`}
+    ${!one.running && html`<div class="buttons">${!one.damage && html`<${Button} kind="main" icon="play" label=${t("recordings.watch")} of=${one.file} onClick=${() => watch(one.file)} /><${Button} label=${t("recordings.play")} of=${one.file} on=${shown.value === one.file} onClick=${() => { shown.value = shown.value === one.file ? "" : one.file; }} />`}
       ${!one.damage && all.value && all.value.filter((r) => !r.running && !r.damage).length > 1 && html`<${Compared} one=${one} />`}
       ${one.parts.map((part, i) => html`<a class="button" href=${`/api/recordings/${encodeURIComponent(part.file)}`} download=${part.file} aria-label=${`${t("recordings.download")}: ${part.file}`}>${t("recordings.download")}${several ? ` ${i + 1}` : ""}</a>`)}
       <${Button} kind="danger" label=${t("remove")} of=${one.file} verb="record" onClick=${() => remove(one.file)} /></div>`}
@@ -68,6 +69,7 @@ function Row({ one }) {
 export function Recordings() {
   const on = recording.value;
   useEffect(() => { refresh(); if (!on) return undefined; const timer = setInterval(refresh, LOOK); return () => clearInterval(timer); }, [on, connections.value]);
+  if (watchedFile()) return html`<${Watch} />`;
   return html`<section class="robots recordings" aria-label=${t("view.recordings")}><div class="bar"><h1>${t("view.recordings")}</h1></div>
     <${Recording} />
     ${failure.value ? html`<p class="warned">${t("refused", { why: failure.value })}</p>` : all.value && !all.value.length ? html`<p class="muted">${t("recordings.none")}</p>` : null}

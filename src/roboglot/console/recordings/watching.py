@@ -1,0 +1,63 @@
+"""Recordings watched on a page: their outline, and excerpts of one robot, read in a thread, one at a time."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import OrderedDict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from roboglot.console.recordings.kept import RecordingFolder
+from roboglot.extras import explaining
+from roboglot.model.errors import InvalidGoal, NotFound
+
+if TYPE_CHECKING:
+    from roboglot.console.recordings.excerpts import Excerpts
+
+OPEN_MAX = 2  # recordings whose index is kept
+SECONDS_MAX = 120.0  # of one excerpt
+
+
+class Watching:
+    """Reads the recordings of a folder for pages that watch them."""
+
+    def __init__(self, folder: RecordingFolder) -> None:
+        self._folder = folder
+        self._turn = asyncio.Lock()
+        self._open: OrderedDict[tuple[str, int, int], Excerpts] = OrderedDict()
+
+    async def outline(self, file: str) -> dict[str, object]:
+        """Return length (s), robots and marks of a recording. Raises NotFound, BadRecording, OSError."""
+        async with self._turn:
+            return await asyncio.to_thread(self._outline, self._folder.path(file))
+
+    async def excerpt(self, file: str, robot: str, since: float, seconds: float) -> bytes:
+        """Return a robot's frames from ``since`` on (s since the beginning); see ``Excerpts.read``.
+
+        Raises NotFound, InvalidGoal, BadRecording, OSError.
+        """
+        if not 0.0 < seconds <= SECONDS_MAX:
+            raise InvalidGoal(f"an excerpt has at most {SECONDS_MAX:g} s")
+        async with self._turn:
+            return await asyncio.to_thread(self._excerpt, self._folder.path(file), robot, since, seconds)
+
+    def _outline(self, path: Path) -> dict[str, object]:
+        excerpts = self._excerpts(path)
+        return {"seconds": excerpts.seconds, "robots": excerpts.robots, "marks": excerpts.marks()}
+
+    def _excerpt(self, path: Path, robot: str, since: float, seconds: float) -> bytes:
+        excerpts = self._excerpts(path)
+        if robot not in excerpts.robots:
+            raise NotFound(f"there is no robot {robot!r} in {path.name}")
+        return excerpts.read(robot, since, seconds)
+
+    def _excerpts(self, path: Path) -> Excerpts:
+        with explaining("watching recordings", "recording"):
+            from roboglot.console.recordings.excerpts import Excerpts
+        state = path.stat()
+        key = path.name, state.st_size, state.st_mtime_ns
+        found = self._open.pop(key, None) or Excerpts(path)
+        self._open[key] = found
+        while len(self._open) > OPEN_MAX:
+            self._open.popitem(last=False)
+        return found
