@@ -9,12 +9,14 @@ from typing import Any
 
 import pytest
 
+from roboglot.console.recordings.running import RecordingRequest
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.shards.overview import Overview
 from roboglot.shards.snapshots import Snapshots
-from tests.browser.served import PAGE_PATIENCE, PATIENCE, STILL, OpenConsole, Served, becomes
+from tests.browser.served import PAGE_PATIENCE, PATIENCE, STILL, OpenConsole, Page, Served, becomes
 from tests.browser.served import until as until_page
+from tests.narrowing import known
 from tests.shards.test_overview import Console, fleet_of
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -188,13 +190,43 @@ async def test_axe_finds_nothing_serious(theme: str, served: Served, open_consol
             if tab:
                 await page.click(f"#tab-{tab}")
             await page.wait_for_selector("main > :not(.empty)")
-            found = await page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
-            serious = [
-                (violation["id"], [node["html"][:120] for node in violation["nodes"][:3]])
-                for violation in found["violations"]
-                if violation["impact"] in ("serious", "critical") or violation["id"] == "heading-order"
-            ]
-            assert serious == [], (view, tab, theme)
+            assert await serious_in(page) == [], (view, tab, theme)
+
+
+async def serious_in(page: Page) -> list[tuple[str, list[str]]]:
+    """Return what axe, which the page must have, finds serious."""
+    found = await page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
+    return [
+        (violation["id"], [node["html"][:120] for node in violation["nodes"][:3]])
+        for violation in found["violations"]
+        if violation["impact"] in ("serious", "critical") or violation["id"] == "heading-order"
+    ]
+
+
+async def test_watched_recording_fits_on_a_phone(served: Served, open_console: OpenConsole) -> None:
+    page = await open_console(viewport={"width": 360, "height": 740}, has_touch=True, is_mobile=True)
+    recordings = known(known(served.runtime.console)._desk.recordings)
+    await recordings.do(RecordingRequest("start"))
+    await recordings.do(RecordingRequest("mark", text="a mark with words of one's own " * 3))
+    await served.clock.advance(3.0)
+    served.robot.tap.request("slamware", "GET /a/long/path" * 9, b"{}")
+    ended = await recordings.do(RecordingRequest("stop"))
+    try:
+        await page.evaluate("location.hash = '#/recordings'")
+        await page.click("main li button:has-text('Watch')")
+        await page.wait_for_selector("text=Nothing in these seconds.", state="detached")
+        await page.wait_for_selector("[aria-label=Play]")  # it has come to its end
+        await page.evaluate(AXE)
+        for language in ("EN", "中文"):
+            if await (other := page.locator(f"header >> text={language}")).count():
+                await other.click()
+            await page.wait_for_selector(f"html[lang={'en' if language == 'EN' else 'zh-CN'}]")
+            assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+            assert await page.evaluate(COVERED_OR_CUT) == []
+            assert await page.evaluate(SMALL_TARGETS) == []
+            assert await serious_in(page) == []
+    finally:
+        await recordings.do(RecordingRequest("delete", str(ended["file"])))
 
 
 class Calm(Console):

@@ -75,7 +75,7 @@ async def test_a_recording_is_watched_where_it_was_made(served: Served, open_con
 
     await page.click("main li button:has-text('Watch')")
     await page.wait_for_selector("text=This moves no robot.")
-    await page.click("button:has-text('0:02 it sets off')")
+    await page.click("[aria-label='0:02: it sets off']")
     await page.click("[aria-label=Pause]")
     await becomes(lambda: shows(start), True)
     assert "done" not in await page.inner_text("aside")

@@ -214,6 +214,6 @@ export function Watch() {
         <p class=${why ? "warned" : "muted"} role="status">${why ? t("refused", { why }) : !outline || player.waits.value ? t("watch.reading") : t("watch.hint")}</p>
         ${outline && outline.robots.length > 1 && html`<label class="field"><span>${t("robot")}</span><select value=${player.robot.value} onChange=${(/** @type {any} */ e) => player.choose(e.target.value)}>${outline.robots.map((name) => html`<option>${name}</option>`)}</select></label>`}
         <div class="buttons"><${Button} label=${t("watch.all")} onClick=${() => watch("")} /></div></div>
-      ${outline && outline.marks.length > 0 && html`<div class="card"><h2>${t("watch.marks")}</h2><div class="buttons">${outline.marks.map((mark) => html`<${Button} label=${`${time(mark.at)} ${mark.text}`} onClick=${() => player.seek(mark.at)} />`)}</div></div>`}
+      ${outline && outline.marks.length > 0 && html`<div class="card"><h2>${t("watch.marks")}</h2><ul class="list">${outline.marks.map((mark) => html`<li><${Button} label=${time(mark.at)} of=${mark.text} onClick=${() => player.seek(mark.at)} /><span>${mark.text}</span></li>`)}</ul></div>`}
       ${outline && html`<${Happened} player=${player} />`}</div></aside></div>`;
 }
