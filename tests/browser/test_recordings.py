@@ -5,16 +5,26 @@ from __future__ import annotations
 import asyncio
 import math
 import re
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from roboglot.config import ConsoleConfig, RobotConfig, load_config
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_library import MapLibrary
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.geometry import Point, Pose
+from roboglot.model.tap import Direction, Exchange
+from roboglot.recording.entries import NANO, Entry
+from roboglot.recording.files import Files, Limits, Origin
 from roboglot.recording.reader import read_recording
-from tests.browser.served import OpenConsole, Served, becomes
+from roboglot.recording.redaction import Redaction
+from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_addresses
+from tests.browser.served import OpenConsole, Served, Tabs, becomes
+from tests.narrowing import known
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
@@ -86,6 +96,29 @@ async def test_a_recording_is_watched_where_it_was_made(served: Served, open_con
     await page.click("text=All recordings")
     await page.click("main li button:has-text('Remove')")
     await page.wait_for_selector("text=Nothing has been recorded yet.")
+
+
+async def test_page_says_what_a_recorded_robot_is(browser: Any, tmp_path: Path) -> None:
+    """It said that all was well beside an empty map."""
+    file = tmp_path / "talk.mcap"
+    files = Files(file, Origin({"version": "1", "robots": '{"a": "universal"}'}), Redaction(), Limits())
+    files.open(NANO)
+    asked = Exchange(0.0, "a", "slamware", "c", "127.0.0.1", Direction.REQUEST, "GET /", b"")
+    files.write(Entry("/a/slamware", "exchange", NANO, 0, asked))
+    files.close()
+    base = load_config(None, {"data": str(tmp_path / "data"), "world": "empty"})
+    robots = (RobotConfig("a", f"recording:{file}", free_addresses(1)),)
+    runtime = Runtime(replace(base, robots=robots, console=ConsoleConfig(port=0)))
+    await runtime.start()
+    await known(runtime.console).ready()
+    tabs = Tabs(browser, known(runtime.console).address)
+    try:
+        page = await tabs.open("/#/live", {"person": "anna", "language": "en"}, {"width": 1280, "height": 800})
+        await page.wait_for_selector("text=This robot answers apps as it did in talk.mcap.")
+        assert "All is well." not in await page.inner_text("main")
+    finally:
+        await tabs.close()
+        await runtime.close()
 
 
 async def test_stored_map_is_replaced_only_when_confirmed(served: Served, open_console: OpenConsole) -> None:

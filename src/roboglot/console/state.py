@@ -76,11 +76,13 @@ def _about(robot: Robot) -> dict[str, object]:
     plate = robot.description
     firmware = robot[Firmware].version if Firmware in robot else plate.software_version
     limits = robot[Base].limits if Base in robot else None
+    recorded = robot.responder.recorded if robot.responder is not None else None
     return {
         "maker": plate.maker,
         "model": plate.model,
         "serial": plate.serial,
         "firmware": firmware,
+        "recorded": recorded.path.name if recorded is not None else "",
         "radius": plate.radius,
         "speed": limits.twist.x if limits else 0.0,
         "yaw_speed": limits.twist.yaw if limits else 0.0,

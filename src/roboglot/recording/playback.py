@@ -23,7 +23,7 @@ from roboglot.model.errors import NotFound
 from roboglot.model.responder import Recorded, Responder, ResponderReply
 from roboglot.model.tap import Exchange
 from roboglot.recording.matching import NormalizedRequest, normal, rewritten, with_seq, without_numbers
-from roboglot.recording.reader import AnsweredRequest, BadRecording, Recording, pair, read_recording
+from roboglot.recording.reader import AnsweredRequest, BadRecording, Recording, pair, parts, read_recording
 from roboglot.recording.redaction import FIELDS, Redaction
 from roboglot.recording.timeline import Timeline
 from roboglot.spelling import instead
@@ -34,6 +34,7 @@ OFF = 0.1  # tolerance of a request's number: absolute
 OFF_SHARE = 0.02  # ... or relative
 MISSING_MAX = 1000  # unrecorded requests that are kept
 DAY = 86_400.0
+LARGE = 20_000_000  # bytes of a recording that takes a while to read
 IDS_MAX = 10_000
 _query = re.compile(rb"\?(?:\s+seq\s+\d+)?[\s;]*$")
 _inquiry = re.compile(rb'"operate"\s*:\s*"inquiry"')
@@ -240,6 +241,8 @@ def open_playback(place: str, clock: Clock) -> Playback:
     """Return the robot of ``FILE`` or ``FILE#ROBOT``. Raises ValueError in plain words."""
     path, _, name = place.partition("#")
     try:
+        if (size := sum(part.stat().st_size for part in parts(Path(path)))) > LARGE:
+            log.info("reading %s, %.0f MB; this takes some seconds", path, size / 1e6)
         recording = read_recording(Path(path))
     except OSError as error:
         raise ValueError(f"recording {path}: {error.strerror}") from None

@@ -76,6 +76,7 @@ function Control() {
 
 function State() {
   const { about, battery, place, safety, drawings, faults } = state.value, pose = poses.value[current.value];
+  if (about.recorded) return html`<div class="card"><h3>${t("condition")}</h3><p>${t("recorded.hint", { file: about.recorded })}</p></div>`;
   return html`<${Control} />
     <div class="card"><h3>${t("condition")}</h3><${Faults} />${stale.value && html`<p class="warned">${t("link.stale")}</p>`}<dl>
       ${battery && html`<${Row} name=${t("battery")} kind=${battery.low ? "bad" : ""}>${Math.round(battery.charge * 100)} %${battery.charging ? ` · ${t("charging")}` : ""}

@@ -32,7 +32,7 @@ function Tile({ robot }) {
   const lost = status.value === "lost";
   const open = () => { choose(robot.name); location.hash = "#/live"; };
   return html`<li class=${`tile ${worst ? worst.toLowerCase() : lost ? "warning" : ""}`}>
-    ${pose && !lost && state.parts.includes("mapping") && html`<${Thumbnail} name=${robot.name} />`}<h2>${t("robot.named", { name: robot.name })}<small>${about.maker} ${about.model}</small></h2>
+    ${pose && !lost && state.parts.includes("mapping") && html`<${Thumbnail} name=${robot.name} />`}<h2>${t("robot.named", { name: robot.name })}<small>${about.recorded || `${about.maker} ${about.model}`}</small></h2>
     ${lost && html`<p class="warned">${t("link.stale")}</p>`}<dl><div class="row"><dt>${t("battery")}</dt><dd class=${battery?.low ? "bad" : ""}>${battery ? `${Math.round(battery.charge * 100)} %` : "–"}${battery?.charging ? ` · ${t("charging")}` : ""}</dd></div>
       <div class="row"><dt>${t("task")}</dt><dd>${doing(state) || (safety.docked ? t("docked") : t("task.none"))}</dd></div>
       <div class="row"><dt>${t("control")}</dt><dd>${robotWord(control.taken_by || control.holder) || t("control.nobody")}</dd></div>
