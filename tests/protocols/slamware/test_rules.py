@@ -48,6 +48,21 @@ async def test_a_forbidden_area_is_gone_around(client: httpx.AsyncClient, forwar
     assert max(abs(y) for _, y in await path(client, 2.5, 0.0)) > 1.0
 
 
+@pytest.mark.parametrize(
+    ("metadata", "depth", "leaves"),
+    [({}, 0.9, True), ({"escape_distance": "0.4"}, 0.2, True), ({"escape_distance": "0.4"}, 0.6, False)],
+)
+async def test_forbidden_area_is_left_from_its_edge(
+    client: httpx.AsyncClient, forward: Forward, metadata: dict[str, str], depth: float, leaves: bool
+) -> None:
+    """The area that a robot can escape from is counted from the border inwards."""
+    await forward(seconds=1)
+    area = {"start": {"x": -depth, "y": 0.0}, "end": {"x": 3.0, "y": 0.0}, "half_width": 2.0}
+    await client.post(f"{AREAS}/forbidden_area", json={"area": area, "metadata": metadata})
+    assert bool(await path(client, 1.0, 3.0)) is leaves
+    assert await path(client, 1.0, 0.0)  # within it, it moves
+
+
 async def test_a_dangerous_area_is_crossed_slowly(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
     await forward(seconds=1)
     area = {"start": {"x": -1.0, "y": 0.0}, "end": {"x": 5.0, "y": 0.0}, "half_width": 2.0}

@@ -116,9 +116,12 @@ def layers(
     closed = frame.beside(drawn.lines_of(LineKind.WALL), WALL_HALF)
     for area in _kept_out_of(drawn):
         if area.contains(start):
-            # A robot inside may leave; a goal inside stays unreachable unless it belongs to a lift.
+            # A robot inside may leave, unless too deep; a goal inside stays unreachable unless it belongs to a lift.
             extra = np.zeros(frame.shape, np.float32) if extra is None else extra
-            extra[frame.inside(area)] += LEAVING_COST if area.kind is AreaKind.FORBIDDEN else 0.0
+            inside = frame.inside(area)
+            extra[inside] += LEAVING_COST if area.kind is AreaKind.FORBIDDEN else 0.0
+            if area.escape is not None and area.depth(start) > area.escape:
+                extra[~inside] = np.inf
         elif area.kind is not AreaKind.ELEVATOR or not any(map(area.contains, goals)):
             closed |= frame.inside(area)
     return Layers(closed, extra, _speeds(drawn, frame))

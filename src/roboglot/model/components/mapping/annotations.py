@@ -31,7 +31,7 @@ class LineKind(StrEnum):
 class AreaKind(StrEnum):
     """Meaning of an area."""
 
-    FORBIDDEN = "forbidden"  # robots may not enter; one that is inside may leave
+    FORBIDDEN = "forbidden"  # robots may not enter; one that is inside may leave, unless deeper than ``escape``
     ELEVATOR = "elevator"
     DANGEROUS = "dangerous"  # not faster than ``speed_max``
     COVERAGE = "coverage"  # to be swept or disinfected
@@ -98,12 +98,17 @@ class Area:
 
     def contains(self, point: Point | Pose) -> bool:
         """True if ``point`` lies inside or on the border."""
+        return self.depth(point) >= 0.0
+
+    def depth(self, point: Point | Pose) -> float:
+        """Return the distance (m) inwards from the border to ``point``; negative outside."""
         along = math.hypot(self.end.x - self.start.x, self.end.y - self.start.y)
         dx, dy = point.x - self.start.x, point.y - self.start.y
         if along == 0.0:
-            return dx == dy == 0.0
+            return 0.0 if dx == dy == 0.0 else -math.hypot(dx, dy)
         ux, uy = (self.end.x - self.start.x) / along, (self.end.y - self.start.y) / along
-        return 0.0 <= dx * ux + dy * uy <= along and abs(dy * ux - dx * uy) <= self.half_width
+        ahead = dx * ux + dy * uy
+        return min(ahead, along - ahead, self.half_width - abs(dy * ux - dx * uy))
 
     def corners(self) -> tuple[Point, Point, Point, Point]:
         """Return the corners counter-clockwise, from the one to the right of ``start``."""
