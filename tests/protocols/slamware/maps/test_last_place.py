@@ -123,12 +123,20 @@ async def test_robot_on_its_dock_is_on_start_floor(stored: Database) -> None:
         assert run.robot[Localization].pose.distance_to(run.truth) < 0.05
 
 
+async def test_robot_set_up_on_another_floor_finds_itself(stored: Database) -> None:
+    """As after a ride by lift: the world puts it back at its start, and off every dock."""
+    async with running(stored, StartConfig(x=12.0, y=14.0, yaw=0.0, floor=0)) as run:
+        assert await run.floor() == "ground"
+        assert run.robot[Floors].current == 0
+        await run.clock.advance(5.0)
+        assert run.robot[Localization].lost is None
+        assert run.robot[Localization].pose.distance_to(run.truth) < 0.1
+
+
 @pytest.mark.slow
-async def test_robot_on_another_floor_is_lost(stored: Database) -> None:
+async def test_lost_robot_keeps_its_last_place(stored: Database) -> None:
     async with running(stored, StartConfig(x=12.0, y=6.5, yaw=0.0, floor=0)) as run:
-        await run.clock.advance(3.0)
         assert run.robot[Localization].lost is not None
-        assert await run.floor() == "first"
         kept = last_place(run.robot)
     async with running(stored, StartConfig(x=13.5, y=10.0, yaw=0.0, floor=1)) as run:
         assert last_place(run.robot) == kept  # a lost robot stores nothing

@@ -16,7 +16,6 @@ from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.artifact.drawing import seen_from
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap
-from roboglot.protocols.slamware.chapters.slam.last_place import LastPlace, is_docked
 
 DRAWN = "slamware/drawn.json"  # the file of drawings on that map's other floors
 NOT_MOVED = (0.0, 0.0)
@@ -61,19 +60,6 @@ def frame_on_disk(robot: Robot) -> tuple[str, str, Sequence[float]] | None:
         return None
     digest = next(iter(basis))
     return digest, floor, basis[digest]
-
-
-def resumed(
-    robot: Robot, floors: Sequence[FloorMap], digest: str, last: LastPlace | None
-) -> tuple[FloorMap, Pose | None] | None:
-    """Return floor and pose of the ``last`` place (pose None: at its dock); None if the place is unknown.
-
-    A robot that has come onto its dock while it was off, or has left it, was moved.
-    """
-    floor = next((floor for floor in floors if last and (digest, floor.name.map_id) == (last.digest, last.floor)), None)
-    if last is None or floor is None or last.docked < is_docked(robot):
-        return None
-    return floor, last.pose if last.docked == is_docked(robot) else None
 
 
 def replacement(floor: FloorMap, basis: dict[str, Sequence[float]], drawn: dict[str, Drawings]) -> Replacement:

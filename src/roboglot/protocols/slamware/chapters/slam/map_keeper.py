@@ -47,10 +47,10 @@ from roboglot.protocols.slamware.chapters.slam.map_frames import (
     put_aside,
     put_drawings,
     replacement,
-    resumed,
     with_docks,
 )
 from roboglot.protocols.slamware.chapters.slam.map_start import MapStart
+from roboglot.protocols.slamware.chapters.slam.resuming import resumed
 from roboglot.wire.slamware.chapters.multi_floor import MapLoadStatus
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
 from roboglot.wire.slamware.chapters.slam.stcm import Layer, decode_stcm, encode_stcm
