@@ -15,6 +15,7 @@ from roboglot.config import ConsoleConfig, RobotConfig, load_config
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_library import MapLibrary
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.events import MapReplaced
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.entries import NANO, Entry
@@ -139,6 +140,7 @@ async def test_stored_map_is_replaced_only_when_confirmed(served: Served, open_c
         return (await library.get("hall")).saved_at if "hall" in await library.names() else None
 
     page.on("dialog", lambda dialog: asyncio.ensure_future(answer(dialog)))
+    await served.clock.advance(2.0)  # makes a map
     await page.click("#tab-drawn")
     await save(name)
     await becomes(saved_at, served.clock.epoch())
@@ -150,4 +152,15 @@ async def test_stored_map_is_replaced_only_when_confirmed(served: Served, open_c
     confirmed = True
     await save(name, sure)
     await becomes(saved_at, served.clock.epoch())
+    grids, loads = (
+        list[MapReplaced](),
+        "Load the map hall? It replaces the map in use, which is lost unless it is saved.",
+    )
+    served.robot.events.listen(MapReplaced, grids.append)
+    for now in (False, True):
+        confirmed = now
+        asked.clear()
+        await page.click("button:has-text('Load')")
+        await becomes(lambda: asyncio.sleep(0, [*asked]), [loads])
+    await becomes(lambda: asyncio.sleep(0, len(grids)), 1)  # of the load that was confirmed
     await library.remove("hall")

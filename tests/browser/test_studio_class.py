@@ -1,4 +1,7 @@
-"""A class in real pages: join by code, the teacher's grid, a pupil's screen shown, handed in, stopped, exported."""
+"""A class in real pages: join by code, the teacher's grid, a pupil's screen shown, handed in, stopped, exported.
+
+And pages of those who may not move a robot now: it is locked by the teacher, or not theirs to stop.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,15 @@ from pathlib import Path
 
 import pytest
 
+from roboglot.access.store import Grant
+from roboglot.model.components.system.lease import TEACHER, Lease
+from roboglot.operations import Right
 from tests.browser.served import shows, until
+from tests.browser.test_rights import PASSWORD, Guarded, guarded, open_page, sign_in
 from tests.browser.test_studio import FOREVER, Open, Page, loaded, phase, studio
+from tests.narrowing import known
 
-__all__ = ["studio"]  # the fixture
+__all__ = ["guarded", "open_page", "studio"]  # the fixtures
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 UNDER = """[...document.querySelectorAll('.pupils li > *')].filter(part => { // hidden by something, or out of its card
     const box = part.getBoundingClientRect(), card = part.parentElement.getBoundingClientRect();
@@ -110,3 +118,27 @@ async def test_a_class_from_its_code_to_its_results(studio: Open) -> None:
     await anna.context.close()
     await until(teacher, f"{row}.includes('away')")
     assert teacher.errors == []
+
+
+async def test_buttons_of_locked_robots_say_why(guarded: Guarded, open_page: Open) -> None:
+    guarded.add("lea", "program")
+    page, lease, why = await open_page(), guarded.runtime.fleet.robots["a"][Lease], "The teacher has locked this robot."
+    await sign_in(page, "lea")
+    await page.wait_for_selector("text=Tap to send the robot")
+    await lease.take(TEACHER)
+    await page.wait_for_selector(f"button[aria-disabled=true][title='{why}']:has-text('Take control')")
+    assert await page.locator("text=Tap to send the robot").count() == 0
+    assert await page.get_attribute(".stop", "aria-disabled") is None
+    await lease.release()
+    await page.wait_for_selector("text=Tap to send the robot")
+
+
+async def test_refused_stop_of_all_says_why(guarded: Guarded, open_page: Open) -> None:
+    rights = [Grant("a", frozenset({Right.DRIVE})), Grant("b", frozenset({Right.SEE}))]
+    guarded.store.add_person("half", PASSWORD, rights)
+    known(guarded.runtime.guard).reload()
+    page = await open_page()
+    await sign_in(page, "half")
+    await page.click("nav >> text=Robots")
+    await page.click("text=Stop all")
+    await page.wait_for_selector("text=/^Not stopped: b \\(.*drive.*\\)$/")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 CLIENT = "console"
 COMMAND = "command"  # the kind of recorded inputs for commands
 TAKE = "take_control"  # handled separately because it concerns the caller
+STOP = "stop"  # ends programs, too: their next statement would move the robot again
 # Commands that also work while the robot is off or restarts. What others set would be lost when it starts.
 HOLD = frozenset({"stop", "cancel", "emergency_stop", "give_control", "release_control", "dismiss_fault"})
 assert map_verbs  # importing it registers its verbs
@@ -179,7 +181,15 @@ class Desk:
         with robot.admission.noting(CLIENT, verb), self._input(robot, verb, values, client):
             if robot.starts.down and verb not in HOLD:
                 raise Refused(robot.starts.down)
-            return await operation.call(robot, values)
+            programs = self.studio.programs.get(name) if verb == STOP and not values else None
+            if programs is None or not programs.service.running():
+                return await operation.call(robot, values)
+            ending = programs.end_all(why="ended by a stop at the console")
+            ends = await asyncio.gather(operation.call(robot, values), ending, return_exceptions=True)
+            await operation.call(robot, values)  # what the programs began until then
+            for error in filter(None, ends):
+                raise error
+            return None
 
     @staticmethod
     def _input(

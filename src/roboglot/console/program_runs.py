@@ -39,8 +39,7 @@ async def end_all(desk: Desk, name: str) -> None:
         raise NotFound(f"there is no robot {name!r}")
     with robot.admission.noting(CLIENT, "stop"), robot.inputs.noting(PROGRAM, END, {}):
         if (programs := desk.studio.programs.get(name)) is not None:
-            running = [figures.target_id for figures in programs.service.running()]
-            await programs.service.shutdown(running, why="ended by the teacher")
+            await programs.end_all(why="ended by the teacher")
         await stop(robot)
 
 

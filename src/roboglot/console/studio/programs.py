@@ -27,6 +27,11 @@ class Programs:
     frames: FrameRelay
     service: ProgramService
 
+    async def end_all(self, why: str) -> None:
+        """End every program that runs or is held; ``why`` is the last line of their logs."""
+        running = [figures.target_id for figures in self.service.running()]
+        await self.service.shutdown(running, why=why)
+
 
 @dataclass(frozen=True, slots=True)
 class ClassHome:

@@ -91,7 +91,10 @@ async def undock(robot: Robot) -> Started:
 
 @VERBS.on("stop")
 async def stop(robot: Robot) -> None:
-    """Cancel everything that moves the robot, for any client, and hold its orders; returns when it stands."""
+    """Cancel everything that moves the robot, for any client, end its programs, and hold its orders.
+
+    Returns when it stands.
+    """
     await stopping.stop(robot, reason="stopped at the console", moving=True)
 
 

@@ -148,14 +148,16 @@ export function Icon({ name, size = 20 }) {
 }
 
 /** What the person at the page may do with the robot that is shown, which right each verb needs, which it has no part for. */
-export const rights = signal(/** @type {{mine: string[] | null, needs: Record<string, string>, absent: string[]}} */ ({ mine: null, needs: {}, absent: [] }));
+export const rights = signal(/** @type {{mine: string[] | null, needs: Record<string, string>, absent: string[], locked?: boolean}} */ ({ mine: null, needs: {}, absent: [] }));
 export const can = (/** @type {string} */ verb) => !rights.value.absent.includes(verb);
 
-/** Why a verb is not for this person, in words; empty: it is. @param {string} [verb] */
+/** Why a verb is not for this person, in words; empty: it is. A locked robot may be stopped, and programs that move nothing run. @param {string} [verb] */
 export function lacks(verb) {
-  const { mine, needs } = rights.value;
+  const { mine, needs, locked } = rights.value;
   const right = verb ? needs[verb] : undefined;
-  return !right || !mine || mine.includes(right) ? "" : t("right.missing", { right: t(`right.${right}`) });
+  if (!verb || !right || !mine) return "";
+  if (mine.includes(right)) return locked && right !== "see" && !/^(stop|program)$/.test(verb) ? t("right.locked") : "";
+  return t("right.missing", { right: t(`right.${right}`) });
 }
 
 /** A button; `on` shows that it is chosen; `verb` is what it has done: it is off without the right to that, or for another `why`, and says so;

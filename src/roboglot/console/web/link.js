@@ -35,9 +35,10 @@ export const current = computed(() => {
 export const state = computed(() => states.value[current.value] ?? null);
 export const stale = computed(() => status.value === "lost" || Boolean(state.value?.faults?.some((f) => f.name === "link lost"))); // the values are old
 export const simulated = computed(() => Boolean(hello.value?.robots.find((r) => r.name === current.value)?.simulated));
+export const TEACHER = "console teacher"; // a role: who locked the robots of a class
 effect(() => {
   const robot = hello.value?.robots.find((r) => r.name === current.value);
-  rights.value = { mine: robot ? [...robot.rights, ...(hello.value.all ? ["all"] : [])] : null, needs: hello.value?.needs ?? {}, absent: state.value?.absent ?? [] };
+  rights.value = { mine: robot ? [...robot.rights, ...(hello.value.all ? ["all"] : [])] : null, needs: hello.value?.needs ?? {}, absent: state.value?.absent ?? [], locked: !hello.value?.teacher && state.value?.control.taken_by === TEACHER };
 });
 export const wanted = signal({ wire: false, truth: false, seen: false, moving: true }); // moving: at the rate of a map that is drawn
 

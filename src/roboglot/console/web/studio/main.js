@@ -3,7 +3,7 @@ import { render } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import { computed, effect, signal, untracked } from "@preact/signals";
 import { Button, Icon, PATHS, html, kept, lacks, language, loadWords, notice, place, robotWord, say, t, theme } from "../base.js";
-import { choose, connect as connectRobot, current, hello, me, state, status, want } from "../link.js";
+import { TEACHER, choose, connect as connectRobot, current, hello, me, state, status, want } from "../link.js";
 import { loadTable } from "./blocks.js";
 import { Group } from "./class.js";
 import { Help, Keys, Library, Schedule, shown } from "./dialogs.js";
@@ -87,7 +87,6 @@ function Bar() {
   </div>`;
 }
 
-const TEACHER = "console teacher"; // a role: who locked the robots of a class
 /** The client that alone may move the robot; empty: this program may, too. */
 function holder() {
   const taken = state.value?.control?.taken_by ?? "";

@@ -121,7 +121,8 @@ export const step = (/** @type {Step} */ how = "step") => run(how);
 export async function operate(operation, id = program.value.id) {
   try {
     const { feedback } = await frame({ type: "task", operate: operation, target_id: [id] });
-    if (feedback.state) say(t("refused", { why: feedback.describe }), true);
+    const over = operation === "shutdown" && mine(id) && phase.value === "idle"; // the robot's own stop was faster
+    if (feedback.state && !over) say(t("refused", { why: feedback.describe }), true);
     return !feedback.state;
   } catch (error) { say(t("refused", { why: error.message }), true); return false; }
 }

@@ -38,7 +38,7 @@ export function Maps() {
   };
   return html`<div class="card"><h3>${t("maps")}</h3>
     ${kept.value.length ? html`<ul class="list">${kept.value.map((map) => html`<li><span>${map}</span>
-      <${Button} label=${t("map.load")} of=${map} verb="load_map" onClick=${() => change("load_map", { map }, t("map.loading", { map }))} />
+      <${Button} label=${t("map.load")} of=${map} verb="load_map" onClick=${() => { if (confirm(t("map.load.sure", { map }))) change("load_map", { map }, t("map.loading", { map })); }} />
       <${Button} label=${t("map.merge")} of=${map} verb="merge_map" on=${merging.value === map} onClick=${() => { merging.value = merging.value === map ? "" : map; }} />
       <${Button} label=${t("remove")} of=${map} verb="remove_map" onClick=${() => { if (confirm(t("map.remove.sure", { map }))) change("remove_map", { map }, t("map.removed", { map })); }} /></li>`)}</ul>` : html`<p class="muted">${t("maps.none")}</p>`}
     ${merging.value && html`<${Merge} />`}

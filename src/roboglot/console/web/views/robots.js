@@ -1,6 +1,6 @@
 // All robots at a glance: charge, task, trouble, who has them; one click into one, one to stop them all.
 import { useEffect, useState } from "preact/hooks";
-import { Button, Icon, doing, fixed, html, robotWord, say, t } from "../base.js";
+import { Button, Icon, doing, fixed, html, robotWord, say, t, translated } from "../base.js";
 import { ask, choose, hello, poses, states, status } from "../link.js";
 
 /** Why a robot is not for this person to stop; empty: it is. */
@@ -9,7 +9,7 @@ const lacking = (robot) => (robot.rights.includes("drive") ? "" : t("right.missi
 async function stopAll() {
   const names = hello.value.robots.map((r) => r.name);
   const results = await Promise.allSettled(names.map((name) => ask(name, "stop")));
-  const failed = names.filter((_, i) => results[i].status === "rejected");
+  const failed = names.flatMap((name, i) => (results[i].status === "rejected" ? `${name} (${translated(results[i].reason.message)})` : []));
   say(failed.length ? t("stopped.not", { names: failed.join(", ") }) : t("stopped.all", { n: names.length }), failed.length > 0);
 }
 

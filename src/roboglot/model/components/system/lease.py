@@ -150,6 +150,13 @@ class Lease(Component):
         if Settings in self._robot:
             await self._robot[Settings].put(KEPT, self._taken_by)
 
+    @property
+    def _taken(self) -> str:
+        words = f"control is taken by {self._taken_by}"
+        if self._taken_by == TEACHER:
+            words = f"the teacher has locked robot {self._robot.id}"
+        return words
+
     def _admit(self, action: Action) -> None:
         """Raise Busy for an action that may not start. Stopping is allowed unless others move a real robot."""
         if not moves(action):
@@ -159,7 +166,7 @@ class Lease(Component):
         elif self._outside_since is not None:
             why = "another client moves the robot; it is free when that is done, or when control is taken"
         elif not self.may_move(action.client) and not _stops(action.goal):
-            why = f"control is taken by {self._taken_by}"
+            why = self._taken
         else:
             return
         self._publish_refused(action, why)
@@ -199,7 +206,7 @@ class Lease(Component):
             for fault in (TAKEN, OUTSIDE):
                 health.set(fault, False, "lease", FaultLevel.WARNING)
             if self._taken_by:
-                health.set(TAKEN, True, "lease", FaultLevel.WARNING, f"control is taken by {self._taken_by}")
+                health.set(TAKEN, True, "lease", FaultLevel.WARNING, self._taken)
             if self._outside_since is not None:
                 health.set(OUTSIDE, True, "lease", FaultLevel.WARNING, "another client moves the robot")
         self._publish()
