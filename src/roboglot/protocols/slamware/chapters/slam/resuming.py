@@ -32,7 +32,7 @@ def resumed(
 
 def _floor_here(robot: Robot, floors: Sequence[FloorMap], building: str) -> FloorMap | None:
     """Return the floor with the name of the lift's stop at which the robot is; None if there is no such."""
-    if Floors not in robot:
+    if Floors not in robot or LiftClient not in robot:
         return None
     stop = robot[LiftClient].floors[robot[Floors].current]
     return next((floor for floor in floors if (floor.name.building, floor.name.floor) == (building, stop)), None)
