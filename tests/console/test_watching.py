@@ -6,6 +6,7 @@ import json
 import math
 import struct
 import zlib
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,15 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from PIL import Image
 
 from roboglot.console.recordings import watching
 from roboglot.console.recordings.excerpts import ROWS_MAX, SCANS_MAX, Excerpts
 from roboglot.console.recordings.kept import RecordingFolder
+from roboglot.console.recordings.pictures import last_picture
 from roboglot.console.recordings.watching import Watching
+from roboglot.media.h264 import H264Encoder
+from roboglot.model.components.sensing.camera import Frame
 from roboglot.model.components.system.fault import FaultLevel
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.geometry import ORIGIN, Point, Pose
@@ -204,6 +209,51 @@ def test_strange_messages_are_named(tmp_path: Path, topic: str, kind: str, value
         Excerpts(tmp_path / "r.mcap").read("a", 0.0, 1.0)
 
 
+def filmed(path: Path, damaged: int = -1) -> Excerpts:
+    """Record ten seconds of a camera at 4 Hz, each picture brighter than the one before; one may be damaged."""
+    files, encoder = Files(path, Origin(FACTS), Redaction(), Limits()), H264Encoder(320, 180, 4.0)
+    files.open(1000 * NANO)
+    files.write(Entry("/tf", "transforms", 1000 * NANO, 0, (("a/odom", "a/base_link", ORIGIN),)))
+    for number in range(8, 40):  # the camera begins after two seconds
+        planes = np.full((270, 320), 128, np.uint8)
+        planes[:180] = 20 + 5 * number
+        data = encoder.encode(Frame(number / 4, planes)).data
+        at = 1000 * NANO + number * NANO // 4
+        files.write(Entry("/a/camera", "video", at, 0, ("a/camera", data[:30] if number == damaged else data)))
+    files.close()
+    return Excerpts(path)
+
+
+def brightness(units: list[bytes]) -> float:
+    """Return the mean brightness of the last picture as the camera had it, 16 to 235."""
+    picture = Image.open(BytesIO(last_picture(units)))
+    assert picture.size == (640, 360)
+    return 16 + float(np.asarray(picture).mean()) * 219 / 255
+
+
+@pytest.mark.parametrize("at", [2.0, 2.3, 4.9, 6.25, 9.75, 30.0])
+def test_picture_is_that_of_its_moment(tmp_path: Path, at: float) -> None:
+    excerpts = filmed(tmp_path / "r.mcap")
+    assert excerpts.filmed == ["a"]
+    if at > 15.0:
+        assert excerpts.film("a", at) == []  # it had ended long before
+        return
+    assert brightness(excerpts.film("a", at)) == pytest.approx(20 + 5 * math.floor(at * 4), abs=3.0)
+
+
+def test_damaged_picture_hides_only_itself(tmp_path: Path) -> None:
+    excerpts = filmed(tmp_path / "r.mcap", damaged=22)
+    assert brightness(excerpts.film("a", 5.5)) == pytest.approx(20 + 5 * 21, abs=8.0)
+    assert brightness(excerpts.film("a", 6.0)) == pytest.approx(20 + 5 * 24, abs=3.0)
+
+
+def test_moments_without_a_picture_are_named(tmp_path: Path) -> None:
+    excerpts = filmed(tmp_path / "r.mcap")
+    for robot, at in (("a", 1.9), ("b", 5.0)):
+        with pytest.raises(NotFound, match="no picture of this moment"):
+            last_picture(excerpts.film(robot, at))
+
+
 async def test_few_recordings_are_kept_open(tmp_path: Path) -> None:
     for name in "abc":
         recorded(tmp_path / f"{name}.mcap")
@@ -230,5 +280,6 @@ async def test_recording_of_this_program_is_watched(served: ServedConsole) -> No
     assert outline["marks"][0]["at"] == pytest.approx(2.0, abs=0.2)
     moves = moves_of(await served.read(f"{path}/a/1000/2000"))
     assert len(moves) == pytest.approx(20, abs=2)
-    for wrong, expected in (("a/0/121000", 400), ("a/x/1000", 400), ("a/0/0", 400), ("z/0/1000", 404), ("a/0", 404)):
+    refused = {"a/0/121000": 400, "a/x/1000": 400, "a/0/0": 400, "z/0/1000": 404, "a/0": 404, "a/0/camera.jpg": 404}
+    for wrong, expected in refused.items():
         assert (await served.ask(f"{path}/{wrong}"))[0] == expected, wrong

@@ -156,6 +156,9 @@ class Api:
                 await recordings.kept.send(file, send)
             case "GET", ["recordings", file, "watch"]:
                 await answer_json(send, await recordings.watching.outline(file))
+            case "GET", ["recordings", file, "watch", robot, at, "camera.jpg"]:
+                picture = await recordings.watching.picture(file, robot, _seconds(at))
+                await answer(send, 200, b"image/jpeg", picture, [(b"cache-control", b"no-store")])
             case "GET", ["recordings", file, "watch", robot, since, seconds]:
                 excerpt = await recordings.watching.excerpt(file, robot, _seconds(since), _seconds(seconds))
                 await answer(send, 200, b"application/octet-stream", excerpt, [(b"cache-control", b"no-store")])

@@ -24,6 +24,7 @@ READS = {
     "/api/recordings/{file}": "A file of a recording",
     "/api/recordings/{file}/compared/{other}": "A page that compares two recordings; with /{name}, of one robot",
     "/api/recordings/{file}/watch": "Length, robots and marks of a recording",
+    "/api/recordings/{file}/watch/{name}/{since}/camera.jpg": "What a robot's camera saw then, if it was recorded; ms",
     "/api/recordings/{file}/watch/{name}/{since}/{length}": "What a robot saw and did then; both times in ms",
     "/api/blocks": "Every function of robot programs for an editor: names, types, ranges, choices",
     "/api/lessons": "The missions of the studio",

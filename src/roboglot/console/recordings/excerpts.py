@@ -6,6 +6,7 @@ An excerpt holds what a page shows between two moments, thinned out, and the map
 from __future__ import annotations
 
 import math
+import re
 import struct
 from collections.abc import Callable, Sequence
 from itertools import islice
@@ -13,6 +14,7 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.Grid_pb2 import Grid
 from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan as ScanMessage
@@ -35,6 +37,8 @@ ROWS_MAX = 200  # of one excerpt, and of each kind
 MARKS_MAX = 500
 TEXT_MAX = 200  # characters of a row's text
 NANO = 1e9
+FILM_SECONDS = 5.0
+KEY_PICTURE = re.compile(rb"\x00\x00\x01[\x25\x45\x65]")  # a slice of an IDR picture
 STATES = "map", "battery", "faults", "actions"  # topics whose last message tells what is so at a moment
 DAMAGE = DecodeError, ValueError, KeyError, TypeError, AttributeError, OverflowError
 _head = struct.Struct("<Id").pack  # bytes of a frame, and its time
@@ -64,6 +68,39 @@ class Excerpts:
         wanted = {place for place, name in enumerate(self._names) if name == "/marks"}
         found = islice(self._index.only(wanted), MARKS_MAX)
         return [{"at": self._since(mark.at), "text": self._text_of(mark)} for mark in found]
+
+    @property
+    def filmed(self) -> Sequence[str]:
+        """Names of the robots whose camera is in it, sorted."""
+        return sorted(name.split("/")[1] for name in self._names if name.endswith("/camera") and name.count("/") == 2)
+
+    def film(self, robot: str, at: float) -> list[bytes]:
+        """Return the access units (H.264, Annex B) of a camera up to a moment (s since the beginning).
+
+        They begin with the last key picture of the ``FILM_SECONDS`` before it; empty without one. Raises BadRecording,
+        OSError.
+        """
+        last = self._index.first + round(at * NANO)
+        wanted = {place for place, name in enumerate(self._names) if name == f"/{robot}/camera"}
+        units: list[bytes] = []
+        for batch in self._index.play(max(self._index.first, last - round(FILM_SECONDS * NANO))):
+            if batch[0].at > last:
+                break
+            for message in batch:
+                if message.topic in wanted and message.at <= last:
+                    unit = self._unit(message.data)
+                    if KEY_PICTURE.search(unit):
+                        units.clear()
+                    elif not units:
+                        continue
+                    units.append(unit)
+        return units
+
+    def _unit(self, data: bytes) -> bytes:
+        try:
+            return bytes(CompressedVideo.FromString(data).data)
+        except DecodeError as error:
+            raise BadRecording(f"{self._path.name} has a picture that cannot be read: {error}") from None
 
     def read(self, robot: str, since: float, seconds: float) -> bytes:
         """Return the frames of a robot from ``since`` on (s since the beginning).

@@ -1,4 +1,4 @@
-"""Recordings watched on a page: their outline, and excerpts of one robot, read in a thread, one at a time."""
+"""Recordings watched on a page: outline, excerpts and pictures of one robot, read in a thread, one at a time."""
 
 from __future__ import annotations
 
@@ -41,15 +41,33 @@ class Watching:
         async with self._turn:
             return await asyncio.to_thread(self._excerpt, self._folder.path(file), robot, since, seconds)
 
+    async def picture(self, file: str, robot: str, at: float) -> bytes:
+        """Return what a robot's camera saw at a moment (s since the beginning), as a JPEG.
+
+        Raises NotFound, BadRecording, OSError.
+        """
+        async with self._turn:
+            return await asyncio.to_thread(self._picture, self._folder.path(file), robot, at)
+
     def _outline(self, path: Path) -> dict[str, object]:
         excerpts = self._excerpts(path)
-        return {"seconds": excerpts.seconds, "robots": excerpts.robots, "marks": excerpts.marks()}
+        return {
+            "seconds": excerpts.seconds,
+            "robots": excerpts.robots,
+            "filmed": excerpts.filmed,
+            "marks": excerpts.marks(),
+        }
 
     def _excerpt(self, path: Path, robot: str, since: float, seconds: float) -> bytes:
         excerpts = self._excerpts(path)
         if robot not in excerpts.robots:
             raise NotFound(f"there is no robot {robot!r} in {path.name}")
         return excerpts.read(robot, since, seconds)
+
+    def _picture(self, path: Path, robot: str, at: float) -> bytes:
+        from roboglot.console.recordings.pictures import last_picture
+
+        return last_picture(self._excerpts(path).film(robot, at))
 
     def _excerpts(self, path: Path) -> Excerpts:
         with explaining("watching recordings", "recording"):

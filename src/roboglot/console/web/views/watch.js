@@ -23,7 +23,7 @@ class Player {
   /** @param {string} file */
   constructor(file) {
     this.file = file;
-    this.outline = signal(/** @type {{seconds: number, robots: string[], marks: {at: number, text: string}[]} | null} */ (null));
+    this.outline = signal(/** @type {{seconds: number, robots: string[], filmed: string[], marks: {at: number, text: string}[]} | null} */ (null));
     this.failure = signal("");
     this.robot = signal("");
     this.at = signal(0);
@@ -65,12 +65,13 @@ class Player {
     return { now, all: [before, now].filter((one) => one !== null) };
   }
 
-  /** Let time pass; it waits for what is not there yet. @param {number} seconds of the machine's time */
+  /** Let time pass; it waits for what is not there yet.
+   * @param {number} seconds of the machine's time; below 0 at first, as a frame may have begun before it was asked for */
   pass(seconds) {
     const { seconds: end } = this.outline.value ?? { seconds: 0 };
     this.waits.value = !this.excerpts?.failure.value && !this.scene.now;
     if (!this.playing.value || !this.scene.now) return;
-    const at = this.at.value, next = Math.min(at + Math.min(seconds, 0.25) * this.speed.value, end);
+    const at = this.at.value, next = Math.min(at + Math.min(Math.max(seconds, 0), 0.25) * this.speed.value, end);
     this.at.value = next;
     if (Math.floor(next / this.speed.value * BEATS) !== Math.floor(at / this.speed.value * BEATS)) this.beat.value += 1;
     if (next === end) this.playing.value = false;
@@ -182,6 +183,17 @@ function distinct(rows, at) {
   });
 }
 
+const filming = signal(false); // whether the camera's pictures are shown
+
+/** What the camera saw: a new picture each second of the page's time. @param {{player: Player}} props */
+function Film({ player }) {
+  player.beat.value; // looked at again when it changes
+  const step = player.speed.value, at = Math.floor(player.at.peek() / step) * step;
+  const path = `${player.excerpts?.path}/${at * 1000}/camera.jpg`;
+  return html`<details class="card" open=${filming.value} onToggle=${(/** @type {any} */ e) => { filming.value = e.target.open; }}><summary>${t("camera")}</summary>
+    ${filming.value && html`<div class="screen"><img alt=${t("watch.camera")} src=${path} onLoad=${(/** @type {any} */ e) => { e.target.hidden = false; }} onError=${(/** @type {any} */ e) => { e.target.hidden = true; }} /></div>`}</details>`;
+}
+
 const messages = signal(true); // whether they are listed, too
 
 /** @param {{player: Player}} props */
@@ -215,5 +227,6 @@ export function Watch() {
         ${outline && outline.robots.length > 1 && html`<label class="field"><span>${t("robot")}</span><select value=${player.robot.value} onChange=${(/** @type {any} */ e) => player.choose(e.target.value)}>${outline.robots.map((name) => html`<option>${name}</option>`)}</select></label>`}
         <div class="buttons"><${Button} label=${t("watch.all")} onClick=${() => watch("")} /></div></div>
       ${outline && outline.marks.length > 0 && html`<div class="card"><h2>${t("watch.marks")}</h2><ul class="list">${outline.marks.map((mark) => html`<li><${Button} label=${time(mark.at)} of=${mark.text} onClick=${() => player.seek(mark.at)} /><span>${mark.text}</span></li>`)}</ul></div>`}
+      ${outline?.filmed.includes(player.robot.value) && html`<${Film} player=${player} />`}
       ${outline && html`<${Happened} player=${player} />`}</div></aside></div>`;
 }
