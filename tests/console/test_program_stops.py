@@ -12,7 +12,7 @@ from tests.console.test_teaching import taught
 
 __all__ = ["taught"]  # the fixture
 ROUND = "while True:\n    cyberdog.motion.turn(90, 3)\n"
-HALTED, TAUGHT = "ended by a stop at the console", "ended by the teacher"
+HALTED, TAUGHT = "ended by Stop", "ended by the teacher"
 
 
 async def turns_round(served: ServedConsole) -> None:

@@ -184,7 +184,7 @@ class Desk:
             programs = self.studio.programs.get(name) if verb == STOP and not values else None
             if programs is None or not programs.service.running():
                 return await operation.call(robot, values)
-            ending = programs.end_all(why="ended by a stop at the console")
+            ending = programs.end_all(why="ended by Stop")
             ends = await asyncio.gather(operation.call(robot, values), ending, return_exceptions=True)
             await operation.call(robot, values)  # what the programs began until then
             for error in filter(None, ends):

@@ -59,7 +59,7 @@ function Tile({ robot, world }) {
     ${lost.value && html`<p class="warned">${t("link.stale")}</p>`}<dl><div class="row"><dt>${t("fleet.world")}</dt><dd>${world.name} · ${up ? t("fleet.pace", { factor: world.factor.toFixed(2) }) : t(`fleet.${world.state}`)}</dd></div>
       ${known && html`<div class="row"><dt>${t("battery")}</dt><dd class=${state.battery?.low ? "bad" : ""}>${state.battery ? `${Math.round(state.battery.charge * 100)} %` : "–"}${state.battery?.charging ? ` · ${t("charging")}` : ""}</dd></div>
       <div class="row"><dt>${t("task")}</dt><dd>${doing(state) || (state.safety.docked ? t("docked") : t("task.none"))}</dd></div>
-      <div class="row"><dt>${t("control")}</dt><dd>${state.control.taken_by || state.control.holder || t("control.nobody")}</dd></div>`}</dl>
+      <div class="row"><dt>${t("control")}</dt><dd>${robotWord(state.control.taken_by || state.control.holder) || t("control.nobody")}</dd></div>`}</dl>
     ${!up && world.reason ? html`<p class="warned"><${Icon} name="alert" size=${16} />${t("fleet.why", { why: world.reason })}</p>` : null}
     ${state?.error ? html`<p class="muted">${t("fleet.why", { why: state.error })}</p>` : null}
     ${known && (state.safety.emergency_stop ? html`<p class="warned"><${Icon} name="alert" size=${16} />${t("estop.on")}</p>` : state.faults.length ? html`<p class="warned"><${Icon} name="alert" size=${16} />${robotWord(state.faults[0].name)}</p>` : !lost.value && html`<p class="allwell">${t("faults.none")}</p>`)}
