@@ -187,7 +187,7 @@ class Tools:
         return await self._act(robot, "drive", values, seconds + 5.0)
 
     async def stop(self, robot: Robot = DEFAULT) -> str:
-        """Stop everything that moves the robot, no matter who began it; its delivery orders wait for a person."""
+        """Stop what moves the robot, no matter who began it, and its programs; delivery orders wait for a person."""
         await _answer_of(self._console.post(dict, "robots", robot, "stop", values={}))
         return "it stands"
 
