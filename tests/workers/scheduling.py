@@ -48,6 +48,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:
                 super()._assign_work_unit(node)
 
         def _reschedule(self, node: WorkerController) -> None:
+            if node not in self.registered_collections:
+                return  # it replaces one that crashed, and gets tests when it has collected them
             super()._reschedule(node)
             if not node.shutting_down and self._pending_of(self.assigned_work[node]) < 2:
                 self._reschedule(node)  # a worker begins no test before it has the next, or is to end
