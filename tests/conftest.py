@@ -30,8 +30,7 @@ from hypothesis.internal.conjecture import providers
 from hypothesis.internal.constants_ast import Constants
 from hypothesis.internal.entropy import deterministic_PRNG
 
-from roboglot.cli.warm import installation
-from roboglot.hosting import closing
+from roboglot.hosting import closing, installation
 from roboglot.storage.settings import StoredSettings
 from tests.workers import warm_start
 from tests.workers.scheduling import pytest_xdist_make_scheduler  # noqa: F401 - a hook

@@ -23,8 +23,8 @@ from pathlib import Path
 
 from _claim import Claims
 
-from roboglot.cli.warm import installation
-from roboglot.cli.warm.installation import socket_path
+from roboglot.hosting import installation
+from roboglot.hosting.installation import socket_path
 from roboglot.programs.rehearsing import Scene
 from roboglot.rehearsal import Rehearsals
 

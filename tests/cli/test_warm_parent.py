@@ -13,8 +13,9 @@ from pathlib import Path
 import pytest
 
 from roboglot.__main__ import _start_warm
-from roboglot.cli.warm import command, installation
-from roboglot.cli.warm.installation import socket_path
+from roboglot.cli.warm import command
+from roboglot.hosting import installation
+from roboglot.hosting.installation import socket_path
 from tests.workers.warm_start import COLD
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks of a warm parent are there on Linux only")
@@ -224,7 +225,7 @@ def test_command_that_began_is_not_started_again(tmp_path: Path) -> None:
 
 
 def test_changed_sources_end_the_parent(place: Place) -> None:
-    changed = "from roboglot.cli.warm import installation as i, command as w\ni.stamp = lambda: 'changed'\n"
+    changed = "from roboglot.cli.warm import command as w\nw.installation.stamp = lambda: 'changed'\n"
     asked = [sys.executable, "-c", changed + "w.launch = print\nw.run(w.CODE, ['pass'])"]
     launched = subprocess.run(asked, env=place.environment, capture_output=True, text=True, check=True).stdout
     assert launched.strip() == socket_path(place.environment)

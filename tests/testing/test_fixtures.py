@@ -12,7 +12,7 @@ import execnet
 import pytest
 
 import roboglot.fleet
-from roboglot.cli.warm import installation
+from roboglot.hosting import installation
 from roboglot.model.geometry import Pose
 from roboglot.testing import assert_pose
 from roboglot.testing.plugin import pytest_xdist_setupnodes

@@ -76,7 +76,8 @@ def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_setupnodes(specs: list[object]) -> None:
     """Start pytest-xdist's local workers in forks of the warm parent, which have everything imported."""
-    from roboglot.cli.warm import command, installation
+    from roboglot.cli.warm import command
+    from roboglot.hosting import installation
 
     if not installation.is_wanted(os.environ):
         return

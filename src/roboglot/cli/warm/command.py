@@ -14,7 +14,7 @@ import signal
 import socket
 import sys
 
-from roboglot.cli.warm import installation
+from roboglot.hosting import installation
 
 COMMAND, CODE = "command", "code"
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGUSR2)

@@ -26,8 +26,8 @@ from typing import NoReturn, TypedDict
 
 from roboglot.cli import built, run_to_end
 from roboglot.cli import main as run_command
-from roboglot.cli.warm import installation
 from roboglot.cli.warm.command import CODE, DESCRIPTORS_MAX, LENGTH, MESSAGE_MAX
+from roboglot.hosting import installation
 from roboglot.shards.warm_up import ENVIRONMENT, ended, fork, modules_of, wake_at_ends, warm
 
 IDLE = 300.0  # s

@@ -1,4 +1,4 @@
-"""Identity of an installation for its warm parent: folder and name of the socket, and a stamp of the sources.
+"""Identity of an installation for processes that wait to be forked: folder and name of a socket, stamp of the sources.
 
 Imports little, because every command that may start warm reads it first.
 """
@@ -12,7 +12,7 @@ from _blake2 import blake2b  # hashlib, which has it from there, would load Open
 from collections.abc import Iterator, Mapping
 
 WARM = "ROBOGLOT_WARM"  # 0: no command starts warm; 1: even where CI is set
-PACKAGE = __file__.rsplit(os.sep, 3)[0]
+PACKAGE = __file__.rsplit(os.sep, 2)[0]
 # What changes an interpreter or a library while it is loaded, so that a fork with other values would differ.
 OF_THE_INTERPRETER = (
     *("PYTHON", "LC_", "LANG", "NUMBA_", "OPENBLAS_", "OMP_", "MKL_", "GRPC_", "LD_", "MALLOC_"),
@@ -44,17 +44,20 @@ def folder_of(environment: Mapping[str, str]) -> str:
     return folder
 
 
-def socket_path(environment: Mapping[str, str]) -> str:
-    """Return the socket of this installation's parent. Raises OSError, also if its path is too long for one."""
-    path = f"{folder_of(environment)}/{name_of(environment)}.socket"
+def socket_path(environment: Mapping[str, str], *marks: str) -> str:
+    """Return the socket of this installation's parent, or of another process, that differs with ``marks``.
+
+    Raises OSError, also if its path is too long for a socket.
+    """
+    path = f"{folder_of(environment)}/{name_of(environment, *marks)}.socket"
     if len(os.fsencode(path)) > PATH_MAX:
         raise OSError(f"{path} is too long for a socket")
     return path
 
 
-def name_of(environment: Mapping[str, str]) -> str:
-    """Return the name of the parent for this installation, user, interpreter settings, priority and rights."""
-    parts = [sys.prefix, sys.executable, sys.version, PACKAGE]
+def name_of(environment: Mapping[str, str], *marks: str) -> str:
+    """Return a name that differs with installation, user, interpreter settings, priority, rights and ``marks``."""
+    parts = [sys.prefix, sys.executable, sys.version, PACKAGE, *marks]
     parts += sorted(f"{key}={value}" for key, value in environment.items() if key.startswith(OF_THE_INTERPRETER))
     parts += [str(os.getpriority(os.PRIO_PROCESS, 0)), str(os.sched_getscheduler(0)), *rights_of("self")]
     return blake2b(os.fsencode("\0".join(parts)), digest_size=8).hexdigest()
