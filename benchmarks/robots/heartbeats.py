@@ -142,8 +142,11 @@ def look_by_ray(claims: Claims, plan: FleetPlan, seconds: float) -> None:
         def look(self, known: int) -> bytes:
             import msgspec
 
-            state = None if known else said[0]
-            return msgspec.json.encode(Condition(1, "node", 7, True, True, state, Beat(1.0, 0, 0.0), None, []))
+            said_once = None if known else said[0]
+            beat = Beat(1.0, 0, 0.0)
+            return msgspec.json.encode(
+                Condition(1, "node", 7, 0, State.READY, 0.0, said_once, beat, "", hopeless=False, lines=[])
+            )
 
         def stop(self) -> bytes:
             return b""

@@ -1,17 +1,12 @@
-"""A fleet on several Ray nodes of this machine: a killed node's robots run elsewhere, none of them twice."""
+"""A fleet on a stand-in for Ray: its shards' actors, what they report, and the end of Ray."""
 
 from __future__ import annotations
 
 import asyncio
 import errno
-import importlib
-import inspect
 import os
 import signal
-import time
-from collections.abc import Iterator
 from concurrent.futures import Future
-from functools import partialmethod
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -24,7 +19,6 @@ os.environ["RAY_AUTH_MODE"] = "disabled"  # no token in the home folder
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 
 import ray
-from ray.cluster_utils import Cluster
 
 from roboglot.shards import cluster as cluster_module
 from roboglot.shards.actor import Condition
@@ -34,110 +28,13 @@ from roboglot.shards.messages import Beat, Ready, Refusal
 from roboglot.shards.plan import plan_fleet
 from roboglot.shards.ray_processes import RayProcesses
 from roboglot.shards.states import State, detached_on
-from roboglot.storage.opening import open_registry
-from roboglot.storage.robot_registry import Claim, RobotRegistry
-from roboglot.testing.addresses import free_addresses, free_port
+from roboglot.testing.addresses import free_addresses
 from tests.shards.children import child
 
-STORE = 80 << 20
 PATIENCE = 300.0  # s
-AGENTS_PORTS = "metrics_agent_port", "metrics_export_port", "dashboard_agent_listen_port", "runtime_env_agent_port"
 FIRST = free_addresses(4)
-HEALTH = {  # a node that no longer listens counts as gone after 2 s; one that answers late on a busy machine does not
-    "health_check_initial_delay_ms": 1000,
-    "health_check_period_ms": 1000,
-    "health_check_timeout_ms": 60_000,
-    "health_check_failure_threshold": 2,
-}
 # Ray's own threads leave sockets and files to the collector.
 pytestmark = pytest.mark.filterwarnings("ignore")
-
-
-@pytest.fixture
-def patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have Ray wait for its nodes as long as they take.
-
-    A node registers when its two agents, programs in Python, are up: ten seconds of a processor on a quiet machine. Ray
-    gives up after 30 s, and a raylet ends itself when it does not know its agents' ports after 15 s, both of which a
-    busy machine takes. So the ports are chosen, and written where agents report them, before they start.
-    """
-    from ray._private import services
-
-    persist_port = importlib.import_module("ray._raylet").persist_port  # its stubs lack it
-    get_node, start_raylet = services.get_node, services.start_raylet
-
-    def found(address: str, node: str) -> object:
-        end = time.monotonic() + PATIENCE
-        while True:
-            try:
-                return get_node(address, node)
-            except RuntimeError:
-                if time.monotonic() > end:
-                    raise
-
-    def start(*places: object, **named: object) -> object:
-        given = inspect.signature(start_raylet).bind(*places, **named).arguments
-        for name in AGENTS_PORTS:
-            given[name] = port = free_port()
-            persist_port(given["session_dir"], given["node_id"], name, port)
-        return start_raylet(**given)
-
-    monkeypatch.setattr(services, "get_node", found)
-    monkeypatch.setattr(services, "start_raylet", start)
-    monkeypatch.setattr(Cluster, "_wait_for_node", partialmethod(Cluster._wait_for_node, timeout=PATIENCE))
-
-
-@pytest.fixture
-def cluster(patience: None) -> Iterator[Cluster]:
-    """A head without room for shards, and two nodes with room for all."""
-    head = {"num_cpus": 0, "object_store_memory": STORE, "include_dashboard": False, "_system_config": HEALTH}
-    made = Cluster(initialize_head=True, head_node_args=head)
-    yield made
-    made.shutdown()
-
-
-def claims(registry: Path) -> dict[str, Claim]:
-    database = open_registry(str(registry))
-    try:
-        return asyncio.run(RobotRegistry(database).all())
-    finally:
-        database.close()
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(3 * PATIENCE)
-async def test_killed_nodes_robots_run_elsewhere_and_none_twice(cluster: Cluster, tmp_path: Path) -> None:
-    registry = tmp_path / "registry.db"
-    nodes = {n.node_id[:12]: n for n in (cluster.add_node(num_cpus=1, object_store_memory=STORE) for _ in range(2))}
-    template = {"registry": str(registry), "console": {"enabled": False}}
-    plan = plan_fleet(2, 1, template, tmp_path, first=FIRST)
-    (tmp_path / "fleet").mkdir()
-    with joined(cluster.address):
-        fleet = ClusterFleet(plan, tmp_path / "fleet", cluster.address)
-        try:
-            await fleet.start()
-            await fleet.shards.settle()  # it has waited for 90 s, which two busy cores take
-            states = {(shard.state, shard.reason) for shard in fleet.shards.values()}
-            assert states == {(State.READY, "")}
-            before = await asyncio.to_thread(claims, registry)
-            where = {name: fleet._nodes.get(name, "") for name in fleet.shards}
-            victim = where["w1"]
-            began = time.monotonic()
-            cluster.remove_node(nodes[victim], allow_graceful=False)
-            moved = [shard for name, shard in fleet.shards.items() if where[name] == victim]
-            await fleet.shards.until(
-                lambda: all(s.state is State.READY and fleet._nodes.get(s.plan.name) != victim for s in moved)
-            )
-            print(f"robots of a killed node are back after {time.monotonic() - began:.1f} s")
-            after = await asyncio.to_thread(claims, registry)
-            for shard in fleet.shards.values():
-                (robot,) = shard.plan.robots
-                lost = where[shard.plan.name] == victim
-                assert after[robot].epoch == before[robot].epoch + lost
-                assert (after[robot].holder != before[robot].holder) == lost
-        finally:
-            await fleet.close()
-    assert not ray.is_initialized()
 
 
 async def test_late_answer_of_a_shard_is_dropped() -> None:
@@ -150,10 +47,61 @@ async def test_late_answer_of_a_shard_is_dropped() -> None:
     answer.set_result(b"")  # raises if the future was cancelled, too
 
 
+async def test_restarts_of_shards_and_actors_are_counted(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    fleet = ClusterFleet(plan_fleet(1, 1, {}, tmp_path), tmp_path, "local")
+    shard = fleet.shards["w1"]
+    counts = []
+    for run, restarts in ((7, 1), (7, 1), (7, 3), (9, 0), (9, 0), (9, 1), (5, 2)):
+        fleet._seen(shard, condition_of(State.READY, run=run, restarts=restarts))
+        counts.append(shard.restarts)
+    assert counts == [1, 1, 3, 4, 4, 5, 8]
+    assert caplog.messages == ["shard w1 restarted on node"] * 4
+
+
+async def test_quick_restart_is_noticed(tmp_path: Path) -> None:
+    fleet = ClusterFleet(plan_fleet(1, 1, {}, tmp_path), tmp_path, "local")
+    shard = fleet.shards["w1"]
+    fleet._seen(shard, condition_of(State.READY))
+    waiting = asyncio.create_task(fleet.shards.until(lambda: shard.restarts == 1))
+    await asyncio.sleep(0.0)
+    fleet._seen(shard, condition_of(State.READY, restarts=1))
+    await asyncio.wait_for(waiting, PATIENCE)
+
+
+async def test_doors_are_those_of_the_shards_last_start(tmp_path: Path) -> None:
+    fleet = ClusterFleet(plan_fleet(1, 1, {}, tmp_path), tmp_path, "local")
+    shard = fleet.shards["w1"]
+    fleet._seen(shard, condition_of(State.READY))
+    known = msgspec.structs.replace(condition_of(State.READY), ready=None)
+    fleet._seen(shard, known)
+    assert shard.ready == Ready({})
+    fleet._seen(shard, condition_of(State.FAILED, restarts=1, reason="killed by SIGKILL"))
+    assert (shard.ready, shard.reason, shard.hopeless) == (None, "killed by SIGKILL", False)
+    assert fleet._seen_last["w1"].birth != known.birth
+
+
 def test_a_cluster_without_a_registry_is_refused(tmp_path: Path) -> None:
     plan = plan_fleet(1, 1, {}, tmp_path, first=FIRST)
     with pytest.raises(ValueError, match="needs `database` or `registry`"):
         refuse_unfenced(plan, "ray://head")
+
+
+def condition_of(
+    state: State, *, run: int = 7, restarts: int = 0, reason: str = "", hopeless: bool = False
+) -> Condition:
+    return Condition(
+        pid=1,
+        node="node",
+        run=run,
+        restarts=restarts,
+        state=state,
+        silent=0.0,
+        ready=Ready({}) if state is State.READY else None,
+        beat=Beat(1.0, 1, 1.0),
+        reason=reason,
+        hopeless=hopeless,
+        lines=["a line"],
+    )
 
 
 class FakeRay(SimpleNamespace):
@@ -186,8 +134,9 @@ class FakeRay(SimpleNamespace):
             raise self.failure
         answer = Future[bytes]()
         self.looks += 1
-        ready, beat = (Ready({}), Beat(1.0, 1, 1.0)) if self.refusal is None else (None, None)
-        condition = Condition(1, "node", 7, ready is not None, ready is not None, ready, beat, self.refusal, ["a line"])
+        condition = condition_of(State.READY)
+        if self.refusal is not None:
+            condition = condition_of(State.FAILED, reason=self.refusal.reason, hopeless=self.refusal.lasting)
         answer.set_result(msgspec.json.encode(condition))
         return SimpleNamespace(future=lambda: answer)
 

@@ -23,7 +23,7 @@ from roboglot.shards.supervisor import REPORT_MAX, STALE, STARTING_MAX, Supervis
 class FakeNursery:
     """A nursery whose shards do what the test says."""
 
-    def __init__(self, born: Callable[[int, int], None], dead: Callable[[int, int], None], _: object) -> None:
+    def __init__(self, born: Callable[[int, int], None], dead: Callable[[int, int], None], *_: object) -> None:
         self.born, self.dead, self.pid = born, dead, 1
         self.links: dict[int, socket.socket] = {}
         self.forked: list[int] = []

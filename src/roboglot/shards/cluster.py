@@ -76,7 +76,7 @@ class ClusterFleet:
         self._ray = RayProcesses()
         self._actors: dict[str, Actor] = {}
         self._nodes: dict[str, str] = {}
-        self._runs: dict[str, int] = {}
+        self._seen_last: dict[str, Condition] = {}  # by shard
         self._watch: asyncio.Task[None] | None = None
         self._registry_watch: asyncio.Task[None] | None = None
         self._loop = asyncio.get_running_loop()
@@ -84,7 +84,7 @@ class ClusterFleet:
 
     @property
     def nursery(self) -> int:
-        """0: shards on a cluster are not forked."""
+        """0: each node has one of its own."""
         return 0
 
     @property
@@ -149,7 +149,7 @@ class ClusterFleet:
         """Create the shard's actor, or find a running one. Raises OSError in one sentence."""
         with _in_a_sentence():
             self._actors[shard.plan.name] = await asyncio.to_thread(self._actor, shard)
-        self._runs.pop(shard.plan.name, None)
+        self._seen_last.pop(shard.plan.name, None)
         shard.ready, shard.beat = None, Beat(0.0, 0, 0.0)
         self.shards.turn_to(shard, State.STARTING)
 
@@ -167,7 +167,7 @@ class ClusterFleet:
             memory=MEMORY,
             scheduling_strategy="SPREAD",
         )
-        actor: Actor = options.remote(plan.settings, str(shard.folder), of_node=not self._local)
+        actor: Actor = options.remote(plan.name, plan.settings, str(self.folder), of_node=not self._local)
         return actor
 
     def _name(self, plan: ShardPlan) -> str:
@@ -216,7 +216,8 @@ class ClusterFleet:
         actor = self._actors.get(shard.plan.name)
         if actor is None or shard.state in (State.STOPPING, State.STOPPED):
             return
-        known = self._runs.get(shard.plan.name, 0) if shard.ready else 0
+        last = self._seen_last.get(shard.plan.name)
+        known = last.birth if last is not None and shard.ready else 0
         try:
             answer = await asyncio.wait_for(_answer(actor.look.remote(known)), LOOK_MAX)
         except (RayActorError, TimeoutError):
@@ -238,25 +239,31 @@ class ClusterFleet:
 
     def _seen(self, shard: Shard, condition: Condition) -> None:
         name = shard.plan.name
-        if self._runs.get(name, condition.run) != condition.run:
-            shard.restarts, shard.ready = shard.restarts + 1, None
-            log.warning("shard %s restarted on %s", name, condition.node)
-        shard.pid, self._nodes[name], self._runs[name] = condition.pid, condition.node, condition.run
+        is_new = self._count(shard, condition)
+        if condition.state is State.FAILED and condition.reason not in ("", shard.reason):
+            log.warning("shard %s did not start: %s", name, condition.reason)  # it reports the same at each look
+        shard.pid, self._nodes[name], self._seen_last[name] = condition.pid, condition.node, condition
         shard.heard = self._loop.time()
-        shard.ready = (condition.ready or shard.ready) if condition.up else None
-        shard.beat = condition.beat or shard.beat
-        if condition.refusal is not None:
-            if condition.refusal.reason != shard.reason:  # it reports the same each time, until it is started again
-                log.warning("shard %s did not start: %s", name, condition.refusal.reason)
-            shard.reason, shard.hopeless = condition.refusal.reason, condition.refusal.lasting
-            state = State.FAILED if condition.refusal.lasting else State.STARTING  # Ray retries it
-        else:
-            state = State.READY if shard.ready and condition.serving else State.STARTING
-        if state is State.READY:
-            shard.reason = ""
-        if state is not shard.state:
-            self.shards.turn_to(shard, state)
+        shard.ready = (condition.ready or shard.ready) if condition.state is State.READY else None
+        shard.beat, shard.reason, shard.hopeless = condition.beat, condition.reason, condition.hopeless
+        if is_new or condition.state is not shard.state:
+            self.shards.turn_to(shard, condition.state)
+        shard.silent = condition.silent
         _keep(shard.folder / LOG_FILE, condition.lines)  # last, as the disk may be full
+
+    def _count(self, shard: Shard, condition: Condition) -> bool:
+        """Count restarts of the shard by its actor, and of the actor by Ray; return True if there were any."""
+        last = self._seen_last.get(shard.plan.name)
+        if last is None:
+            new = condition.restarts
+        elif last.run == condition.run:
+            new = condition.restarts - last.restarts
+        else:
+            new, shard.ready = 1 + condition.restarts, None
+        shard.restarts += new
+        if new and last is not None:
+            log.warning("shard %s restarted on %s", shard.plan.name, condition.node)
+        return new > 0
 
 
 @contextmanager

@@ -24,9 +24,10 @@ class End(msgspec.Struct, tag=True, frozen=True):
 
 
 class Warm(msgspec.Struct, tag=True, frozen=True):
-    """Message of the nursery: everything is loaded, ``seconds`` after it was started."""
+    """Message of the nursery: everything is loaded, ``seconds`` after it was started. ``pid``: its process."""
 
     seconds: float
+    pid: int = 0
 
 
 class Born(msgspec.Struct, tag=True, frozen=True):

@@ -22,6 +22,7 @@ from roboglot.shards.warm_up import ENVIRONMENT, EXIT_BROKEN, ended, fork, wake_
 
 LAST_SECONDS = 12.0  # s for shards to close when the nursery ends
 LINK_FD = 3  # of a shard
+OPEN_MAX = 1 << 16
 
 
 class Nursery:
@@ -76,7 +77,7 @@ class Nursery:
         return True
 
     def _fork(self, number: int, folder: str, link: int, output: int) -> None:
-        pid = fork(_take_signals)
+        pid = fork(take_signals)
         if pid == 0:
             self._become_shard(folder, link, output)
         self._children[pid] = number
@@ -111,8 +112,8 @@ class Nursery:
         self._control.send(encode(message))
 
 
-def _take_signals() -> None:
-    """Drop the nursery's handlers."""
+def take_signals() -> None:
+    """Drop the nursery's handlers, in a child."""
     for kind in (signal.SIGCHLD, signal.SIGINT, signal.SIGTERM):
         signal.signal(kind, signal.SIG_DFL)
 
@@ -125,7 +126,25 @@ def _take_descriptors(link: int, output: int) -> None:
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
     os.dup2(link, LINK_FD, inheritable=False)
-    os.closerange(LINK_FD + 1, os.sysconf("SC_OPEN_MAX") if os.sysconf("SC_OPEN_MAX") < 1 << 16 else 1 << 16)
+    close_above(LINK_FD)
+
+
+def close_above(number: int) -> None:
+    """Close all descriptors above ``number``."""
+    os.closerange(number + 1, min(os.sysconf("SC_OPEN_MAX"), OPEN_MAX))
+
+
+def serve(control: socket.socket, run: Callable[[str, socket.socket], int], loading: float) -> int:
+    """Report that everything is loaded, serve until the socket closes, and end the shards; return the exit status."""
+    nursery = Nursery(control, run)
+    try:
+        control.send(encode(Warm(loading, os.getpid())))
+        nursery.serve()
+    except (BrokenPipeError, ConnectionResetError):
+        pass
+    finally:
+        nursery.close()
+    return 0
 
 
 def main(descriptor: int) -> None:
@@ -137,14 +156,7 @@ def main(descriptor: int) -> None:
     warm()
     from roboglot.shards.shard import run
 
-    nursery = Nursery(control, run)
-    try:
-        control.send(encode(Warm(time.monotonic() - began)))
-        nursery.serve()
-    except (BrokenPipeError, ConnectionResetError):
-        return
-    finally:
-        nursery.close()
+    serve(control, run, time.monotonic() - began)
 
 
 if __name__ == "__main__":

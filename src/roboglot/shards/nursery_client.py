@@ -12,7 +12,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import msgspec
 
@@ -29,19 +29,35 @@ class NotWarm(RuntimeError):
     """The nursery did not come up."""
 
 
+class NurseryProcess(Protocol):
+    """A nursery's process, as of ``subprocess``."""
+
+    pid: int
+
+    def poll(self) -> int | None:
+        """Return the status with which it ended; None: it has not."""
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Return the status with which it ends. Raises subprocess.TimeoutExpired."""
+
+    def kill(self) -> None:
+        """Kill it."""
+
+
 class StartedNursery(NamedTuple):
     """A nursery that was started, and our end of its control socket."""
 
-    process: subprocess.Popen[bytes]
+    process: NurseryProcess
     control: socket.socket
 
     def abandon(self) -> None:
         """End it, if it has not ended."""
-        with self.process, self.control:
+        with self.control:
             _kill(self.process)
+            self.process.wait()
 
 
-def _kill(nursery: subprocess.Popen[bytes]) -> None:
+def _kill(nursery: NurseryProcess) -> None:
     """Kill a nursery, if it has not ended, and what compiles its kernels."""
     if nursery.poll() is None:
         os.killpg(nursery.pid, signal.SIGKILL)
@@ -75,15 +91,20 @@ def launched(*, wanted: bool) -> Iterator[StartedNursery | None]:
 class NurseryClient:
     """The nursery of a supervisor. ``born`` and ``dead`` are called with a shard's number and its pid or status.
 
-    ``nursery``: one that is loading already, to use first.
+    ``nursery``: one that is loading already, to use first. ``start``: starts one, or connects to one, by default
+    ``launch``.
     """
 
     def __init__(
-        self, born: Callable[[int, int], None], dead: Callable[[int, int], None], nursery: StartedNursery | None = None
+        self,
+        born: Callable[[int, int], None],
+        dead: Callable[[int, int], None],
+        nursery: StartedNursery | None = None,
+        start: Callable[[], StartedNursery] | None = None,
     ) -> None:
-        self._born, self._dead, self._launched = born, dead, nursery
+        self._born, self._dead, self._launched, self._start = born, dead, nursery, start or launch
         self._control: socket.socket | None = None
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: NurseryProcess | None = None
         self._living: set[int] = set()
         self._again: asyncio.TimerHandle | None = None
         self._warm: asyncio.Future[float] = asyncio.get_running_loop().create_future()
@@ -95,8 +116,8 @@ class NurseryClient:
         return self._process.pid if self._process else 0
 
     def open(self) -> None:
-        """Start the nursery; ``warm`` waits for it."""
-        nursery, self._launched = self._launched or launch(), None
+        """Start the nursery; ``warm`` waits for it. Raises OSError."""
+        nursery, self._launched = self._launched or self._start(), None
         self._process, self._control = nursery
         self._control.setblocking(False)
         asyncio.get_running_loop().add_reader(self._control, self._receive)
@@ -159,8 +180,10 @@ class NurseryClient:
             self._lost()
             return
         match msgspec.json.decode(packet, type=Birth):
-            case Warm(seconds=seconds):
+            case Warm(seconds=seconds, pid=pid):
                 self._was_warm = True
+                if pid and self._process is not None:
+                    self._process.pid = pid
                 if not self._warm.done():
                     self._warm.set_result(seconds)
             case Born(number=number, pid=pid):

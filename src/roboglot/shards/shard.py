@@ -9,7 +9,6 @@ import resource
 import signal
 import socket
 import sqlite3
-import threading
 from collections import deque
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,7 +16,6 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from roboglot.config import Config, config_of
-from roboglot.console.studio.programs import ClassHome
 from roboglot.hosting import open_files
 from roboglot.hosting.closing import started
 from roboglot.hosting.error_text import in_words
@@ -29,6 +27,7 @@ from roboglot.protocols import sections
 from roboglot.shards.messages import Beat, News, Ready, Refusal, encode
 
 if TYPE_CHECKING:
+    from roboglot.console.studio.programs import ClassHome
     from roboglot.runtime import Runtime
 
 CLASS_SOCKET = "class"  # in the fleet's folder
@@ -72,6 +71,8 @@ def run(folder: str, link: socket.socket) -> int:
 
 def _class_home(folder: Path) -> ClassHome | None:
     """Return the socket of the fleet's classroom for this shard's folder; None if there is no classroom."""
+    from roboglot.console.studio.programs import ClassHome
+
     path = folder.parent.parent / CLASS_SOCKET
     return ClassHome(path, folder.name) if path.exists() else None
 
@@ -117,8 +118,7 @@ async def _serve(config: Config, reporter: Reporter, class_home: ClassHome | Non
         # A killed predecessor may hold folder and addresses for a moment; wrong settings stay wrong.
         reporter.send(Refusal(_why(error), lasting=isinstance(error, ValueError)))
         return 1
-    if threading.current_thread() is threading.main_thread():  # in a Ray actor, the process belongs to Ray
-        loop.add_signal_handler(signal.SIGTERM, stop.set)
+    loop.add_signal_handler(signal.SIGTERM, stop.set)
     reporter.watch(stop)
     try:
         if not await started(runtime.start(), stop):

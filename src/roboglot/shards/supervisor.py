@@ -7,6 +7,7 @@ import fcntl
 import logging
 import os
 import signal
+from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -37,14 +38,23 @@ class Supervisor:
     """
 
     def __init__(
-        self, plan: FleetPlan, folder: Path, *, memory_max: int = 0, nursery: StartedNursery | None = None
+        self,
+        plan: FleetPlan,
+        folder: Path,
+        *,
+        memory_max: int = 0,
+        nursery: StartedNursery | None = None,
+        start: Callable[[], StartedNursery] | None = None,
     ) -> None:
-        """``folder``: locked for this program; ``memory_max``: bytes per shard; 0: unlimited."""
-        self._memory_max = memory_max
+        """``folder``: locked for this program; ``memory_max``: bytes per shard; 0: unlimited.
+
+        ``nursery``, ``start``: of ``NurseryClient``. With ``start``, the plan is part of one that is stored already.
+        """
+        self._memory_max, self._is_whole = memory_max, start is None
         self.plan, self.folder = plan, folder
         self.shards = Shards(plan, folder)
         self._by_number = {shard.number: shard for shard in self.shards.values()}
-        self._nursery = NurseryClient(self._born, self._dead, nursery)
+        self._nursery = NurseryClient(self._born, self._dead, nursery, start)
         self._turn: asyncio.Task[None] | None = None
         self._watch: asyncio.TimerHandle | None = None
         self._loop = asyncio.get_running_loop()
@@ -63,8 +73,9 @@ class Supervisor:
         return True
 
     async def start(self) -> float:
-        """Start all shards, in turn; return the nursery's warm-up time, s. Raises NotWarm."""
-        save(self.plan, self.folder)
+        """Start all shards, in turn; return the nursery's warm-up time, s. Raises NotWarm, OSError."""
+        if self._is_whole:
+            save(self.plan, self.folder)
         self._nursery.open()
         seconds = await self._nursery.warm()
         for shard in self.shards.values():
