@@ -7,6 +7,7 @@ no robot code, so that the process costs little more than Ray's own part of it.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import os
 import secrets
@@ -144,7 +145,8 @@ class ShardActor:
 
     def stop(self) -> bytes:
         """Close robots and doors in order."""
-        self._loop.call_soon_threadsafe(self._keeping.cancel)
+        with contextlib.suppress(RuntimeError):  # it has ended already
+            self._loop.call_soon_threadsafe(self._keeping.cancel)
         self._thread.join(STOP_SECONDS)
         return b""
 
@@ -180,7 +182,8 @@ class ShardActor:
         try:
             self._loop.run_until_complete(self._keeping)
         except asyncio.CancelledError:
-            return
+            self._loop.run_until_complete(self._loop.shutdown_default_executor())
+            self._loop.close()
         except BaseException:
             log.exception("the supervisor of shard %s ended", self._name)
             time.sleep(AGAIN_SECONDS)
