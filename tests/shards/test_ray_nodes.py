@@ -190,7 +190,9 @@ async def test_shards_of_a_node_share_its_nursery(cluster: Cluster, tmp_path: Pa
             await until_ready(restarts + 1)
             assert len(actors_of(node) - actors) == 1
             assert (nursery_of(first.pid), second.pid) == (nursery, alone)
-            assert "can map and navigate" in (first.folder / LOG_FILE).read_text()
+            async with asyncio.timeout(PATIENCE):
+                while "can map and navigate" not in (first.folder / LOG_FILE).read_text():  # noqa: ASYNC110 - as below
+                    await asyncio.sleep(0.05)
         finally:
             await fleet.close()
     cluster.remove_node(node, allow_graceful=False)

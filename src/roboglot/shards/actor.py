@@ -169,7 +169,7 @@ class ShardActor:
             silent=shard.silent,
             ready=shard.ready if shard.state is State.READY else None,
             beat=shard.beat,
-            reason=shard.reason or self._reason,
+            reason=shard.reason or ("" if shard.state is State.READY else self._reason),
             hopeless=shard.hopeless and shard.state is State.FAILED,  # else the reason has not come yet
             lines=lines,
         )

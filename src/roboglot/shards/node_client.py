@@ -26,7 +26,7 @@ BACKLOG = 512  # connections that wait while the nursery loads
 CONNECT_MAX = 10.0  # s for a nursery that ends to make room for another
 AGAIN_SECONDS = 0.02
 LOG_LINE_MAX = 1 << 12  # bytes
-OF_A_WORKER = "RAY_"  # environment variables of which each process of Ray has others
+OF_A_WORKER = ("RAY_",)  # environment variables of which each process of Ray has others
 PEER = struct.Struct("3i")  # pid, uid, gid
 
 
