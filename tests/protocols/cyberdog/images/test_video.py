@@ -51,9 +51,10 @@ class Watcher:
         assert await self.client.ask(4001, {"offer_sdp": sdp, "uid": self.uid, **more}) == ""
 
     async def connect(self, **more: object) -> None:
-        before = len(self.signals("answer_sdp"))
+        before, failed = len(self.signals("answer_sdp")), len(self.signals("error"))
         await self.offer(**more)
-        await until(lambda: len(self.signals("answer_sdp")) > before)
+        await until(lambda: len(self.signals("answer_sdp")) > before or len(self.signals("error")) > failed)
+        assert len(self.signals("answer_sdp")) > before, self.signals("error")
         answer = self.signals("answer_sdp")[-1]["answer_sdp"]
         await self.peer.setRemoteDescription(RTCSessionDescription(answer["sdp"], answer["type"]))
         await until(lambda: self.peer.connectionState == "connected")
@@ -65,7 +66,8 @@ class Watcher:
 
 
 @pytest.fixture
-async def watch(client, app, door, passing) -> AsyncIterator[Callable[..., Any]]:
+async def watch(client, app, door, passing, monkeypatch) -> AsyncIterator[Callable[..., Any]]:
+    monkeypatch.setattr(door_video, "PATIENCE", 2 * PATIENCE)  # of the machine's time: a busy one takes its own
     await client.ask(10001)
     await passing(lambda: door._context.app.connected)
     watchers: list[Watcher] = []
