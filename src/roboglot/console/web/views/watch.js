@@ -210,7 +210,7 @@ function Happened({ player }) {
       ${battery && html`<div class="row"><dt>${t("battery")}</dt><dd>${Math.round(battery.charge * 100)} %${battery.charging ? ` · ${t("charging")}` : ""}</dd></div>`}
       ${here && html`<div class="row"><dt>${t("pose")}</dt><dd>x ${fixed(here[0])} · y ${fixed(here[1])} m · ${Math.round(here[2] * 180 / Math.PI)}°</dd></div>`}</dl></div>
     <div class="card"><h2>${t("watch.happened")}</h2><div class="buttons"><${Button} label=${t("watch.messages")} on=${messages.value} onClick=${() => { messages.value = !messages.value; }} /></div>
-      ${listed.length ? html`<ol class="actions">${listed.map((row) => html`<${Row} key=${`${row.at} ${row.kind} ${row.id ?? row.text}`} row=${row} />`)}</ol>` : html`<p class="muted">${t("watch.nothing")}</p>`}</div>`;
+      ${listed.length ? html`<ol class="actions">${listed.map((row) => html`<${Row} key=${JSON.stringify(row)} row=${row} />`)}</ol>` : html`<p class="muted">${t("watch.nothing")}</p>`}</div>`;
 }
 
 /** @param {string} file empty: leave */
