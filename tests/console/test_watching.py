@@ -181,7 +181,9 @@ def test_long_excerpts_are_thinned_out(tmp_path: Path) -> None:
     scans = [at for at, *_ in unpacked(data)["scan"]]
     assert SCANS_MAX - 1 <= len(scans) <= SCANS_MAX + 1
     assert max(np.diff(scans)) < 2.0  # s: evenly
-    assert len(rows_of(data)) == ROWS_MAX
+    *ticks, left_out = rows_of(data)
+    assert len(ticks) == ROWS_MAX
+    assert (left_out["kind"], left_out["count"]) == ("left_out", 1201 - ROWS_MAX)
 
 
 @pytest.mark.parametrize(
@@ -257,7 +259,7 @@ def test_moments_without_a_picture_are_named(tmp_path: Path) -> None:
 async def test_few_recordings_are_kept_open(tmp_path: Path) -> None:
     for name in "abc":
         recorded(tmp_path / f"{name}.mcap")
-    found = Watching(RecordingFolder(tmp_path))
+    found = Watching(RecordingFolder(tmp_path), lambda: None)
     for name in "abcab":
         assert (await found.outline(f"{name}.mcap"))["seconds"] == SECONDS
     assert [file for file, *_ in found._open] == ["a.mcap", "b.mcap"]
@@ -273,6 +275,7 @@ async def test_recording_of_this_program_is_watched(served: ServedConsole) -> No
     await served.clock.advance(2.0)
     await served.ask("/api/recording", {"do": "mark", "text": "here"})
     await served.clock.advance(2.0)
+    assert (await served.ask(f"/api/recordings/{begun['file']}/watch"))[0] == 409  # it is being written
     await served.ask("/api/recording", {"do": "stop"})
     path = f"/api/recordings/{begun['file']}/watch"
     status, outline = await served.ask(path)

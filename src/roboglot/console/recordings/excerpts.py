@@ -33,13 +33,14 @@ from roboglot.recording.reader import BadRecording
 from roboglot.validation import decode_json
 
 SCANS_MAX, MAPS_MAX, MOVES_MAX = 100, 12, 1200  # of one excerpt
-ROWS_MAX = 200  # of one excerpt, and of each kind
+ROWS_MAX = 1000  # of one excerpt, and of each kind
+FAULTS_MAX = 100  # of one row
 MARKS_MAX = 500
 TEXT_MAX = 200  # characters of a row's text
 NANO = 1e9
 FILM_SECONDS = 5.0
 KEY_PICTURE = re.compile(rb"\x00\x00\x01[\x25\x45\x65]")  # a slice of an IDR picture
-STATES = "map", "battery", "faults", "actions"  # topics whose last message tells what is so at a moment
+STATES = "map", "battery", "faults", "actions"  # topics whose last message holds at a moment
 DAMAGE = DecodeError, ValueError, KeyError, TypeError, AttributeError, OverflowError
 _head = struct.Struct("<Id").pack  # bytes of a frame, and its time
 
@@ -207,14 +208,16 @@ class _Excerpt:
         return taken.get(rest[0])
 
     def packed(self) -> bytes:
-        """Return all frames."""
+        """Return all frames; the last row counts those that were left out, if any."""
         moves = np.array(self._moves, "<f4").tobytes()
+        if more_rows := sum(max(0, count - ROWS_MAX) for count in self._count.values()):
+            self._rows.append({"at": self._rows[-1]["at"], "kind": "left_out", "count": more_rows})
         rows = msgspec.json.encode(self._rows)
         more = [framed({"kind": "moves", "robot": self._robot}, moves), framed({"kind": "rows"}, rows)]
         return b"".join(_head(len(frame), at) + frame for at, frame in [*self._frames, *((0.0, one) for one in more)])
 
     def _is_due(self, kind: str, at: float) -> bool:
-        """Tell whether one more of a kind is wanted at a time, and note that it is taken."""
+        """Return whether one more of a kind is wanted at a time; if so, it counts as taken."""
         every = self._every[kind]
         if at < self._next[kind] - every / 2:  # they do not come at exactly even times
             return False
@@ -291,12 +294,10 @@ class _Excerpt:
         self._add("battery", at, charge=battery.percentage, charging=battery.charging)
 
     def _take_faults(self, at: float, data: bytes) -> None:
-        faults = decode_json(data, _Faults).faults[:ROWS_MAX]
+        faults = decode_json(data, _Faults).faults[:FAULTS_MAX]
         self._add("faults", at, faults=[{"name": one.name[:TEXT_MAX], "level": _level(one)} for one in faults])
 
     def _take_exchange(self, at: float, data: bytes) -> None:
-        if self._count.get("message", 0) > ROWS_MAX:
-            return
         one = decode_exchange(data)
         if one.direction is Direction.PUSH:  # many times a second, they would hide the rest
             return

@@ -35,7 +35,7 @@ class Recordings:
     def __init__(self, data: Path, recorder: Callable[[], Recorder]) -> None:
         self._folder, self._recorder = data / FOLDER, recorder
         self.kept = RecordingFolder(self._folder)
-        self.watching = Watching(self.kept)
+        self.watching = Watching(self.kept, lambda: self._running)
 
     @property
     def on(self) -> bool:

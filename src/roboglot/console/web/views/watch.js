@@ -159,6 +159,7 @@ function sentence(row) {
     case "action": return { head: robotWord(row.name), badge: robotWord(row.status.toUpperCase()), kind: row.status, small: row.client || t("itself"), bad: row.reason && robotWord(row.reason) };
     case "message": return { head: row.operation, badge: row.status, kind: "", small: `${row.door} ${row.direction === "request" ? "→" : "←"} ${row.text}`, bad: row.refusal };
     case "event": return { head: row.name, badge: "", kind: "", small: row.text, bad: "" };
+    case "left_out": return { head: t("watch.left.out", { n: row.count }), badge: "", kind: "", small: "", bad: "" };
     default: return { head: `● ${row.text}`, badge: "", kind: "", small: "", bad: "" };
   }
 }
@@ -201,12 +202,13 @@ function Happened({ player }) {
   player.beat.value; player.excerpts?.arrived.value; // looked at again when these change
   const at = player.at.peek(), rows = distinct(player.scene.all.flatMap((one) => one.rows), at);
   const last = (/** @type {string} */ kind) => rows.findLast((row) => row.kind === kind);
-  const battery = last("battery"), action = last("action"), faults = last("faults")?.faults ?? [], here = place(player);
-  const running = action && ["accepted", "executing", "canceling"].includes(action.status);
+  const battery = last("battery"), faults = last("faults")?.faults ?? [], here = place(player);
+  const actions = [...new Map(rows.filter((row) => row.kind === "action").map((row) => [row.id, row])).values()]; // each as it is by then
+  const running = actions.findLast((action) => ["accepted", "executing", "canceling"].includes(action.status));
   const listed = rows.filter((row) => !["battery", "faults"].includes(row.kind) && (messages.value || row.kind !== "message")).slice(-ROWS).reverse();
   return html`<div class="card"><h2>${t("condition")}</h2>
       ${faults.length > 0 && html`<ul class="faults">${faults.map((/** @type {any} */ f) => html`<li class=${f.level.toLowerCase()}><${Icon} name="alert" size=${18} /><span><b>${robotWord(f.name)}</b></span></li>`)}</ul>`}
-      <dl><div class="row"><dt>${t("actions.now")}</dt><dd>${running ? robotWord(action.name) : t("actions.none")}</dd></div>
+      <dl><div class="row"><dt>${t("actions.now")}</dt><dd>${running ? robotWord(running.name) : t("actions.none")}</dd></div>
       ${battery && html`<div class="row"><dt>${t("battery")}</dt><dd>${Math.round(battery.charge * 100)} %${battery.charging ? ` · ${t("charging")}` : ""}</dd></div>`}
       ${here && html`<div class="row"><dt>${t("pose")}</dt><dd>x ${fixed(here[0])} · y ${fixed(here[1])} m · ${Math.round(here[2] * 180 / Math.PI)}°</dd></div>`}</dl></div>
     <div class="card"><h2>${t("watch.happened")}</h2><div class="buttons"><${Button} label=${t("watch.messages")} on=${messages.value} onClick=${() => { messages.value = !messages.value; }} /></div>
