@@ -364,6 +364,8 @@ async def test_a_change_of_language_and_look_loses_nothing(studio: Open) -> None
         await until(page, f"document.documentElement.dataset.look === {look!r}")
         style = "getComputedStyle(document.body)"
         assert marks[look] in await page.evaluate(f"{style}.fontFamily + {style}.getPropertyValue('--text')")
+        label = "getComputedStyle(document.querySelector('.blocklyToolboxCategoryLabel'))"
+        assert await page.evaluate(f"{label}.fontFamily === {style}.fontFamily")
         found = await page.evaluate("axe.run({ resultTypes: ['violations'] })")
         assert [v["id"] for v in found["violations"] if v["impact"] in ("serious", "critical")] == []
     await page.click("header >> text=中文")
