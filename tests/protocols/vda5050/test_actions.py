@@ -24,7 +24,7 @@ from roboglot.protocols.vda5050.chapters.sensing import REPORTS, REPORTS_MAX
 from roboglot.protocols.vda5050.context import UNDER_WAY_MAX
 from tests.protocols.held_fairness import held
 from tests.protocols.vda5050.conftest import ADDRESS, Opened, Yard
-from tests.protocols.vda5050.orders import action, instant, order
+from tests.protocols.vda5050.orders import HEADER, action, instant, order
 
 MARKS = str(Path(__file__).parents[2] / "autonomy" / "worlds" / "marks.toml")
 
@@ -144,6 +144,25 @@ async def test_message_to_stop_waits_for_no_other_client(yard: Opened) -> None:
     await one.until(lambda: states(one).get("c", ("", ""))[0] == "FINISHED")
     assert fairness.on
     assert states(one)["s"][0] == "FINISHED"
+
+
+async def test_instant_actions_have_either_name(yard: Opened) -> None:
+    """Clients made from the schemas of 2.0 and before, such as vda-5050-lib, call the list instantActions."""
+    one = await yard("2.1")
+
+    def older(name: str, id: str) -> dict[str, Any]:
+        return {**HEADER, "version": "2.0.0", "instantActions": [action(name, id)]}
+
+    one.control.send("order", {**order("far", [(0, 0), (9, 0)]), "version": "2.0.0"})
+    await one.until(lambda: one.control.state["driving"])
+    fairness = held(one.robot)
+    fairness.on = True
+    one.control.send("instantActions", older("cancelOrder", "c"))
+    await one.until(lambda: "FINISHED" in {state["actionStatus"] for state in one.control.state["actionStates"]})
+    fairness.on = False
+    one.control.send("instantActions", {**older("stateRequest", "s"), "instantActions": 5})
+    await one.until(lambda: bool(one.control.state["errors"]))
+    assert one.control.state["errors"][0]["errorDescription"] == "instantActions must be a list, not a whole number"
 
 
 @pytest.mark.slow

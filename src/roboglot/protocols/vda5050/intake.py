@@ -7,13 +7,12 @@ them up again at every look, and aiomqtt would leave the socket open.
 from __future__ import annotations
 
 import asyncio
-import json
 import socket
 from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol, cast
 
-from roboglot.wire.vda5050.orders import MESSAGE_MAX
+from roboglot.wire.vda5050.orders import MESSAGE_MAX, InstantActions, Malformed, read
 
 if TYPE_CHECKING:
     import aiomqtt
@@ -127,7 +126,6 @@ def stops(message: aiomqtt.Message) -> bool:
     if not isinstance(message.payload, bytes | bytearray) or not str(message.topic).endswith("/instantActions"):
         return False
     try:
-        actions = json.loads(message.payload)["actions"]
-        return any(action["actionType"] in STOPS for action in actions)
-    except (ValueError, TypeError, KeyError, RecursionError):
+        return any(action.action_type in STOPS for action in read(bytes(message.payload), InstantActions).actions)
+    except Malformed:
         return False

@@ -171,14 +171,28 @@ class OrderMessage(msgspec.Struct, frozen=True, rename="camel"):
 
 
 class InstantActions(msgspec.Struct, frozen=True, rename="camel"):
-    """Actions to execute at once."""
+    """Actions to execute at once.
+
+    Their list has two names: 2.1 and 3.0 call it ``actions``; schemas before them, and clients made from those
+    (vda-5050-lib is one), ``instantActions``.
+    """
 
     header_id: Count
     timestamp: Text
     version: Text
     manufacturer: Text
     serial_number: Text
-    actions: Actions
+    listed: Actions | msgspec.UnsetType = msgspec.field(name="actions", default=msgspec.UNSET)
+    instant_actions: Actions | msgspec.UnsetType = msgspec.UNSET
+
+    def __post_init__(self) -> None:
+        if self.listed is msgspec.UNSET and self.instant_actions is msgspec.UNSET:
+            raise ValueError("actions is missing")
+
+    @property
+    def actions(self) -> Actions:
+        """All actions, under either name."""
+        return (*(self.listed or ()), *(self.instant_actions or ()))
 
 
 M = TypeVar("M", OrderMessage, InstantActions)
