@@ -62,6 +62,19 @@ async def test_a_command_in_pieces(client) -> None:
     assert await client.reply() == "chassis_lead;"
 
 
+async def test_text_without_its_end_is_explained(client, monkeypatch, caplog) -> None:
+    """Some clients send no ``;``, which robots run all the same: without a word, ours seemed dead."""
+    monkeypatch.setattr(limits, "UNFINISHED_AFTER", 0.0)
+    client.send("robot mode ?")
+    await until(lambda: "sent 'robot mode ?' and no ';' behind it: every command ends in ';'" in caplog.text)
+    client.send(";")
+    assert await client.reply() == "chassis_lead;"
+    client.send("robot mode ?;robot ba")
+    assert await client.reply() == "chassis_lead;"
+    await client.close()
+    assert caplog.text.count("no ';' behind it") == 1
+
+
 async def test_thousands_in_one_go(client) -> None:
     client.send("robot mode ?;" * 5000)
     for _ in range(5000):

@@ -33,6 +33,7 @@ from roboglot.protocols.robomaster.limits import (
 )
 from roboglot.protocols.robomaster.liveness import DrivingClient
 from roboglot.protocols.robomaster.stops import stops
+from roboglot.protocols.robomaster.unfinished import Unfinished
 from roboglot.transport.eager import begin
 from roboglot.wire.robomaster.lines import END, LineSplitter
 
@@ -70,6 +71,7 @@ class ControlConnection(asyncio.Protocol):
         self._lenient = lenient  # text without a final `;` is executed at once
         self._line_end = line_end  # sent after each answer; used on serial lines
         self._splitter = LineSplitter()
+        self._unfinished = Unfinished(self._explain_end)
         self._greeting = Greeting()
         self._commands: deque[str | None] = deque()
         self._resting: asyncio.TimerHandle | None = None  # while reading is paused
@@ -133,6 +135,7 @@ class ControlConnection(asyncio.Protocol):
         texts = list(self._splitter.feed(turn_away_strangers(self._greeting, self.transport, data)))
         if self._lenient and self._splitter.pending and (rest := self._splitter.flush()) != "":
             texts.append(rest)
+        self._unfinished.note(waiting=bool(self._splitter.begun))
         self._commands.extend(texts)
         self._throttle()
         if self._turn and any(map(stops, texts)):
@@ -156,6 +159,7 @@ class ControlConnection(asyncio.Protocol):
         self._connections.discard(self)
         self._context.robot.inputs.note_client(GONE, DOOR, self._name)
         self._repeated = NOTHING
+        self._unfinished.note(waiting=False)
         self._commands.clear()
         if self._resting:
             self._resting.cancel()
@@ -263,6 +267,13 @@ class ControlConnection(asyncio.Protocol):
         shown = "(a text)" if text is None else repr(text[:TEXT_SHOWN_MAX])
         why = result.warn() if result.warn else result.why
         return f"{self._shown} asked {shown}: {result.reply.decode()} ({why})"
+
+    def _explain_end(self) -> None:
+        """Say why a text without its ``;`` is not answered."""
+        why = "every command ends in ';'" + ("" if self._line_end else "; --robomaster-lenient runs those without, too")
+        text = f"{self._shown} sent {self._splitter.begun[:TEXT_SHOWN_MAX]!r} and no ';' behind it: {why}"
+        self._explain(lambda: text)
+        log.warning("robomaster: %s", text)
 
     def _join(self) -> None:
         """Join the session: a command in SDK mode keeps the robot there."""

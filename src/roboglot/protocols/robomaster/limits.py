@@ -11,6 +11,7 @@ LEFT_PERIOD = 0.1  # s between two checks whether a client whose reading is paus
 OUTPUT_MAX = 64 * 1024  # unread bytes of replies per client; beyond this its next commands wait
 BATCH_MAX = 64  # consecutive commands of one connection before others are served
 EXPLANATIONS_MAX = 100  # refusals explained in the log per connection
+UNFINISHED_AFTER = 2.0  # s after which a text without its `;` is explained in the log
 TEXT_SHOWN_MAX = 120  # characters of a client's text shown in the log
 WAIT_MAX = 60.0  # s of robot time that wait_for_complete waits
 TARGETS_MAX = 20  # people, markers … per datagram

@@ -27,6 +27,11 @@ class LineSplitter:
         """Return whether a text has begun that ends later, even one that is too long to be kept."""
         return self._overlong or bool(self._tail)
 
+    @property
+    def begun(self) -> str:
+        """The text that has begun and not ended, as far as it is kept."""
+        return self._tail.decode(errors="replace").strip()
+
     def feed(self, data: bytes) -> Iterator[str | None]:
         """Yield every text that ``data`` completes, without surrounding white space; skip empty texts.
 
