@@ -8,6 +8,7 @@ import threading
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from urllib.request import Request, urlopen
 
 import pytest
 from opentelemetry.proto.collector.metrics.v1.metrics_service_pb2 import ExportMetricsServiceRequest
@@ -81,6 +82,14 @@ async def test_the_state_of_robots_and_time(served: ServedConsole) -> None:
 
 async def test_metrics_are_only_read(served: ServedConsole) -> None:
     assert (await served.ask("/metrics", {}))[0] == 405
+
+    def head() -> tuple[int, str, bytes]:
+        with urlopen(Request(f"{served.url}/metrics", method="HEAD"), timeout=60) as reply:
+            return reply.status, reply.headers["content-type"], reply.read()
+
+    status, kind, body = await asyncio.to_thread(head)  # as `curl -I` asks
+    assert (status, body) == (200, b"")
+    assert kind.startswith("text/plain")
 
 
 async def test_board_and_the_page_name_what_there_is(served: ServedConsole) -> None:

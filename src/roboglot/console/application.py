@@ -143,7 +143,7 @@ class Application:
         return message
 
     async def _serve_metrics(self, scope: Scope, send: Send) -> None:
-        if scope["method"] != "GET":
+        if scope["method"] not in ("GET", "HEAD"):
             raise Problem(405, "metrics accept GET only")
         for robot in self._desk.robots.values():
             if not robot.admission.may(Right.SEE):
