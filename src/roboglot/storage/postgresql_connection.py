@@ -25,6 +25,11 @@ ON_SERVER = (
     " -c tcp_keepalives_idle=2 -c tcp_keepalives_interval=1 -c tcp_keepalives_count=3 -c tcp_user_timeout=5s"
 )
 
+POOLED = (
+    "a connection pooler answers there, under which neither the locks of robots nor our time limits hold: "
+    "name the server itself"
+)
+
 
 class NoAnswer(psycopg.OperationalError):
     """The server is silent."""
@@ -101,9 +106,9 @@ def limited_by(patience: Patience) -> type[LimitedConnection]:
 
 
 def connect(url: str, kind: type[LimitedConnection]) -> LimitedConnection:
-    """Return a new connection. Raises psycopg.Error, for a silent server, too."""
+    """Return a new connection. Raises psycopg.Error, for a silent server and for a connection pooler, too."""
     try:
-        return kind.connect(
+        connection = kind.connect(
             url,
             autocommit=True,
             connect_timeout=CONNECT_MAX,
@@ -116,6 +121,14 @@ def connect(url: str, kind: type[LimitedConnection]) -> LimitedConnection:
         )
     except psycopg.errors.ConnectionTimeout:
         raise NoAnswer(f"no answer from the database's server within {CONNECT_MAX} s") from None
+    except psycopg.OperationalError as error:
+        if "unsupported startup parameter" in str(error):
+            raise psycopg.OperationalError(POOLED) from None
+        raise
+    if connection.execute("SHOW statement_timeout").fetchone() != (f"{STATEMENT_MAX}s",):
+        connection.close()
+        raise psycopg.OperationalError(POOLED)
+    return connection
 
 
 def close(connection: LimitedConnection) -> None:
