@@ -96,6 +96,8 @@ class Runtime:
         self.guard = self._build_guard() if config.access.on else None
         if self.guard is not None:
             self._files.callback(self.guard.close)
+        for robot in self.fleet.robots.values():
+            robot.admission.outsiders = config.insecure
         self._gateway: Gateway | None = None
         self._tls = self._build_tls()
         self.leases = LeaseServer(

@@ -67,6 +67,8 @@ async def connected(
 async def test_rest_passes_with_the_rights_of_the_token(gateway: tuple[Runtime, str], tmp_path: Path) -> None:
     async with connected(*gateway, tmp_path), httpx.AsyncClient(base_url=f"http://{HERE}:1448", verify=False) as client:
         assert (await client.get(POSE)).status_code == 200
+        behind = {"x-forwarded-for": "203.0.113.7"}  # a proxy at the client's end of the tunnel
+        assert (await client.get(POSE, headers=behind)).status_code == 200
         assert (await client.delete("/api/core/slam/v1/maps")).status_code == 403
         replies = await asyncio.gather(*(client.get("/openapi.json") for _ in range(10)))
         assert len({reply.content for reply in replies}) == 1

@@ -26,7 +26,7 @@ from roboglot.access.store import AccessStore, Grant, IdentityKind, Snapshot, op
 from roboglot.access.trail import Entry, Trail, open_trail
 from roboglot.config import AccessConfig, is_loopback
 from roboglot.model.action import Action
-from roboglot.model.admission import NO_PROOF, Admission, Forbidden, Proof, ProofKind, Right, Unknown
+from roboglot.model.admission import NO_PROOF, THROUGH, Admission, Forbidden, Proof, ProofKind, Right, Unknown
 from roboglot.model.client_context import connection, identity
 from roboglot.model.components.logistics.delivery import Delivery
 from roboglot.model.components.system.lease import Lease, moves
@@ -139,9 +139,9 @@ class Guard:
         """See ``Admission.cached_identity``."""
         if proof is not NO_PROOF:
             return self._proofs.known(proof, address)
-        host = host_of(address)
-        if (tunnelled := self.tunnels.get(host)) is not None and port_of(address) in tunnelled.calls:
-            return tunnelled.who
+        host, peer = host_of(address), address.rpartition(THROUGH)[2]
+        if (tunnelled := self.tunnels.get(host_of(peer))) is not None and port_of(peer) in tunnelled.calls:
+            return tunnelled.who  # whoever else asks at the tunnel's other end
         if self._identities.has(host, IdentityKind.ADDRESS):
             return host
         return LOCAL if self.config.local and is_loopback(host) else None

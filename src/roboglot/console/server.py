@@ -90,7 +90,7 @@ class Console:
         from roboglot.console.studio.channel import MESSAGE_MAX as STUDIO_MESSAGE_MAX
         from roboglot.transport.http import BoundedConnection
 
-        browsers = Browsers("[console]", self._config.origins, self._config.hosts)
+        browsers = Browsers("[console]", self._config.origins, self._config.hosts, self._desk.first.admission)
         classroom = await asyncio.to_thread(self._build_classroom)
         self._login = asyncio.get_running_loop().create_task(asyncio.to_thread(self._open_sessions), name="sessions")
         login = await asyncio.shield(self._login)  # closed even if this ends before it is open

@@ -41,6 +41,7 @@ class Proof(NamedTuple):
 
 
 NO_PROOF = Proof(ProofKind.NONE, "")
+THROUGH = " through "  # "10.0.0.7 through 127.0.0.1:40312": another machine, for which a proxy on this one asks
 
 
 class Unknown(Forbidden):
@@ -55,6 +56,7 @@ class Admission:
     """Admission to one robot. This base class admits every client, with all rights."""
 
     enforced = False
+    outsiders = False  # where not ``enforced``: other machines are admitted, too, for which a proxy on this one asks
     connections_max = 0  # per address, where ``enforced``
 
     def cached_identity(self, address: str, proof: Proof = NO_PROOF) -> str | None:

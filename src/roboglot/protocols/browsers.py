@@ -10,12 +10,14 @@ from __future__ import annotations
 import logging
 import re
 import socket
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 from functools import lru_cache
 from ipaddress import ip_address
 from urllib.parse import urlsplit
 
-from roboglot.config import is_loopback
+from roboglot.config import REMEDY, is_loopback
+from roboglot.model.admission import Admission
+from roboglot.protocols.forwarding import HEADERS, elsewhere_of
 from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
@@ -37,17 +39,25 @@ class Headers:
     referer: str | None = None
     site: str = ""  # Sec-Fetch-Site
     opens_page: bool = False  # a navigation by link, bookmark or address bar
+    elsewhere: str = ""  # the other machine for which a proxy on this one passes the request on
 
 
 class Browsers:
     """The rule of one door. ``setting`` names its part of the configuration, for messages; empty: it has none.
 
     ``origins``: pages of other hosts that may use the door ("https://studio.example"), or "*" for all. ``hosts``: names
-    of this machine beside its addresses, localhost and its own host name. Raises ValueError for what is not an origin.
+    of this machine beside its addresses, localhost and its own host name. ``admission``: where it asks for no names,
+    requests that a proxy passes on for other machines are refused. Raises ValueError for what is not an origin.
     """
 
-    def __init__(self, setting: str, origins: Sequence[str] = (), hosts: Sequence[str] = ()) -> None:
-        self._setting = setting
+    def __init__(
+        self,
+        setting: str,
+        origins: Sequence[str] = (),
+        hosts: Sequence[str] = (),
+        admission: Admission | None = None,
+    ) -> None:
+        self._setting, self._admission = setting, admission
         self._origins = frozenset(_checked(setting, origin) for origin in origins)
         self._hosts = own_names() | {host.lower().rstrip(".") for host in hosts}
         self._warned: set[str] = set()
@@ -84,12 +94,19 @@ class Browsers:
                 f"its Host {headers.host!r} is neither an address nor a known name of this machine"
                 f"{self._hint('hosts', 'adds names')}"
             )
+        if headers.elsewhere and not self._admits_outsiders:
+            remedy = f": {REMEDY}" if self._setting else ""
+            return f"a proxy passes it on for {headers.elsewhere}, and only programs of this machine may use it{remedy}"
         page = headers.origin
         if page is None and headers.site == "cross-site" and not headers.opens_page:
             page = _origin_of(headers.referer)  # pictures and scripts on other pages are requested without an Origin
         if page is None or self._welcomes(page, host):
             return ""
         return f"it comes from a web page of {page!r}{self._hint('origins', 'lets pages of other hosts in')}"
+
+    @property
+    def _admits_outsiders(self) -> bool:
+        return self._admission is None or self._admission.enforced or self._admission.outsiders
 
     def _hint(self, key: str, does: str) -> str:
         return f" ({self._setting} {key} {does})" if self._setting else ""
@@ -129,23 +146,27 @@ def host_name(text: str) -> str | None:
     return (match[1] or match[2]).lower().rstrip(".") if match else None
 
 
-def of_rows(rows: Iterable[tuple[bytes, bytes]], method: str) -> Headers:
+def of_rows(rows: Collection[tuple[bytes, bytes]], method: str) -> Headers:
     """Read the header rows (names in lower case) of an ASGI request."""
-    found = {name: value for name, value in rows if name in _NAMES}
-    return of_texts({name.decode(): value.decode("latin-1") for name, value in found.items()}, method)
-
-
-def of_texts(found: dict[str, str], method: str) -> Headers:
-    """Read headers given by name in lower case."""
+    texts = {name: value.decode("latin-1") for name, value in rows if name in _NAMES}
+    found = {name.decode(): value for name, value in texts.items()}
+    elsewhere = ""
+    if not HEADERS.isdisjoint(texts):  # they may be repeated
+        elsewhere = elsewhere_of(value.decode("latin-1") for name, value in rows if name in HEADERS)
     opens_page = (
         method == "GET" and found.get("sec-fetch-mode") == "navigate" and found.get("sec-fetch-dest") == "document"
     )
     return Headers(
-        found.get("host"), found.get("origin"), found.get("referer"), found.get("sec-fetch-site", ""), opens_page
+        found.get("host"),
+        found.get("origin"),
+        found.get("referer"),
+        found.get("sec-fetch-site", ""),
+        opens_page,
+        elsewhere,
     )
 
 
-_NAMES = frozenset({b"host", b"origin", b"referer", b"sec-fetch-site", b"sec-fetch-mode", b"sec-fetch-dest"})
+_NAMES = HEADERS | {b"host", b"origin", b"referer", b"sec-fetch-site", b"sec-fetch-mode", b"sec-fetch-dest"}
 
 
 def _is_address(host: str) -> bool:

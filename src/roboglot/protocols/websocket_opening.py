@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 from roboglot.model.admission import NO_PROOF, Admission, Forbidden, Proof, ProofKind, Unknown
 from roboglot.model.client_context import set_client
-from roboglot.protocols.browsers import Browsers, of_texts
+from roboglot.protocols.browsers import Browsers, of_rows
 from roboglot.protocols.channels import Channel
+from roboglot.protocols.forwarding import caller
 from roboglot.protocols.websocket_writer import Writer
 from roboglot.values import dataclass
 
@@ -112,16 +113,17 @@ class Opening:
             return
         protocol.available_subprotocols = [Subprotocol(name) for name in channel.subprotocols] or None
         response = protocol.accept(request)
-        headers = {name.lower(): value for name, value in request.headers.raw_items()}
+        rows = [(name.lower().encode(), value.encode()) for name, value in request.headers.raw_items()]
         if response.status_code != HTTPStatus.SWITCHING_PROTOCOLS:
             protocol.send_response(response)
             self._writer.flush(protocol)
-        elif refusal := entrance.browsers.refusal(of_texts(headers, "GET")):
+        elif refusal := entrance.browsers.refusal(of_rows(rows, "GET")):
             self._refuse(protocol, HTTPStatus.FORBIDDEN, refusal)
         elif not entrance.admission.enforced:
             self._accept(protocol, request, channel)
         else:
-            self._authenticate(protocol, request, channel, headers.get("authorization", ""))
+            self._name = caller(self._name, rows)
+            self._authenticate(protocol, request, channel, dict(rows).get(b"authorization", b"").decode())
 
     def _authenticate(self, protocol: ServerProtocol, request: Request, channel: Channel, authorization: str) -> None:
         """Identify the client, in the background if that takes time."""

@@ -17,6 +17,7 @@ from roboglot.config import is_loopback
 from roboglot.console.assets import Assets
 from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json
 from roboglot.console.server import LIBRARIES, bound
+from roboglot.model.admission import Admission
 from roboglot.model.background import load
 from roboglot.protocols.browsers import Browsers, of_rows
 from roboglot.shards.fleet_host import FleetHost
@@ -35,7 +36,8 @@ class Overview:
 
     def __init__(self, fleet_host: FleetHost, host: str, port: int = PORT) -> None:
         self._fleet_host, self._host, self._port = fleet_host, host, port
-        self._snapshots, self._assets, self._browsers = Snapshots(fleet_host), Assets(), Browsers("")
+        self._snapshots, self._assets = Snapshots(fleet_host), Assets()
+        self._browsers = Browsers("", admission=Admission())  # for this machine alone
         self._server: asyncio.Server | None = None
         self._socket: socket.socket | None = None
         self._serving: asyncio.Task[None] | None = None

@@ -7,6 +7,7 @@ from roboglot.console.http import Scope, session_lasts
 from roboglot.console.people.sessions import Sessions, cookie_name, read_cookie
 from roboglot.model.admission import NO_PROOF, Admission, LockedOut, Proof, ProofKind, Unknown
 from roboglot.model.client_context import set_client
+from roboglot.protocols.forwarding import caller
 
 CHALLENGE = (b"www-authenticate", b'Bearer realm="roboglot"')  # not Basic: browsers would open their own prompt
 
@@ -17,9 +18,9 @@ def admission_of(desk: Desk) -> Admission | None:
 
 
 def address_of(scope: Scope) -> str:
-    """Return the client's "host:port"."""
+    """Return the client's "host:port", as ``caller`` has it."""
     host, port = scope.get("client") or ("", 0)
-    return f"{host}:{port}"
+    return caller(f"{host}:{port}", scope["headers"])
 
 
 def cookie_of(scope: Scope) -> str:

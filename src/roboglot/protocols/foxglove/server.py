@@ -40,7 +40,7 @@ class FoxgloveDoor:
         self._sessions: set[Session] = set()
         self._socket: WebSocketServer | None = None
         if config.enabled:
-            browsers = Browsers(f"[{DOOR}]", config.origins, config.hosts)
+            browsers = Browsers(f"[{DOOR}]", config.origins, config.hosts, robot.admission)
             channel = taking_turns(Channel(self._open, Right.SEE, SUBPROTOCOLS, binary=True), robot, stops)
             channel = noted(channel, robot.inputs, DOOR, "/")
             self._socket = WebSocketServer(

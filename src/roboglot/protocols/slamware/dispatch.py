@@ -27,6 +27,7 @@ from roboglot.model.responder import Responder
 from roboglot.model.response_delay import delay_response
 from roboglot.operations import BadParameters, Operation, Right
 from roboglot.protocols.browsers import Browsers, of_rows
+from roboglot.protocols.forwarding import caller
 from roboglot.protocols.slamware.bodies import ClientGone, Receive, Scope
 
 # Each chapter registers its operations.
@@ -216,7 +217,7 @@ class Application:
 
     async def _authenticate(self, scope: Scope) -> None:
         """Authenticate the client, and act for its identity from here on. Raises HttpError 401."""
-        _, address = _peer(scope)
+        address = caller(_peer(scope)[1], scope["headers"])
         header = next((value.decode("latin-1") for name, value in scope["headers"] if name == b"authorization"), "")
         proof = Proof(ProofKind.HTTP, header) if header else NO_PROOF
         try:

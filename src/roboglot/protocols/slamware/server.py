@@ -69,7 +69,7 @@ class SlamwareDoor:
             cloud,
         )
         self._arrivals = Arrivals(self._context)
-        self._browsers = Browsers("[slamware]", config.origins, config.hosts)
+        self._browsers = Browsers("[slamware]", config.origins, config.hosts, robot.admission)
         self._application = Application(self._context, self._browsers)
         self._gate = Gate(robot.admission, tls)
         self._scheme = "https" if tls else "http"

@@ -48,7 +48,7 @@ class VisualDoor:
         self._side_paths = SidePaths(service)
         config = config or VisualConfig()
         if address and config.websocket:
-            browsers = Browsers("[visual]", config.origins, config.hosts)
+            browsers = Browsers("[visual]", config.origins, config.hosts, service.robot.admission)
             self._socket = WebSocketServer(
                 self._channels(), address, config.port, browsers, service.robot.admission, tls
             )
