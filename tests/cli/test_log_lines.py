@@ -93,6 +93,23 @@ class Asked(asyncio.Protocol):
         transport.close()
 
 
+QUIET = """
+import logging
+from roboglot.hosting.logs import set_up_logging
+set_up_logging(False)
+for name in ("aioice.ice", "psycopg.pool", "mcp.server", "roboglot.x", "my_driver"):
+    logging.getLogger(name).info("a line of %s", name)
+    logging.getLogger(name).warning("a warning of %s", name)
+"""
+
+
+def test_libraries_write_warnings_only() -> None:
+    """A camera's call over WebRTC wrote a dozen lines about ICE candidates."""
+    run = subprocess.run([sys.executable, "-c", QUIET], capture_output=True, text=True, timeout=60, check=True)
+    assert run.stderr.count("a warning of") == 5
+    assert {line.split()[5] for line in run.stderr.splitlines() if " INFO " in line} == {"roboglot.x", "my_driver"}
+
+
 @pytest.mark.parametrize("run", [asyncio.run, uvloop.run])
 def test_connections_belong_to_their_doors_robot(run: object) -> None:
     async def answers() -> list[bytes]:

@@ -11,7 +11,9 @@ from roboglot.hosting.escaping import VisibleFormatter
 from roboglot.model.client_context import concerned
 from roboglot.values import dataclass
 
-NOISY = ("uvicorn", "websockets", "httpx", "grpc", "asyncio", "numba")
+NOISY = (  # loggers of libraries; those of drivers and doors of others write INFO lines, too
+    "uvicorn", "websockets", "httpx", "grpc", "asyncio", "numba", "aioice", "aiortc", "libav", "psycopg", "mcp",
+)  # fmt: skip
 LINES_MAX = 50  # of a kind about one robot in PERIOD
 ALL_LINES_MAX = 250  # of a kind about no single robot: a start logs lines for each of 100 robots
 PERIOD = 10.0  # s
