@@ -8,6 +8,8 @@ import json
 import socket
 import sys
 from collections.abc import AsyncIterator
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -16,11 +18,13 @@ from typer.testing import CliRunner
 
 from roboglot.agents.console import ConsoleClient
 from roboglot.cli.mcp import command
+from roboglot.config import ConsoleConfig, RobotConfig, load_config
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.geometry import Pose
-from roboglot.testing.addresses import free_port
-from tests.console.conftest import ServedConsole
-from tests.narrowing import of_kind
+from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_addresses, free_port
+from tests.console.conftest import ADDRESS, ServedConsole
+from tests.narrowing import known, of_kind
 
 if TYPE_CHECKING:
     from mcp import Client
@@ -199,6 +203,23 @@ async def test_refusals_say_why(served: ServedConsole) -> None:
         assert "no robot 'b'" in await refusal(client, "where_am_i", robot="b")
         async with tools_of("http://127.0.0.1:1") as lost:
             assert "start it with `roboglot up`" in await refusal(lost, "robots")
+
+
+async def test_one_of_several_robots_is_named(tmp_path: Path) -> None:
+    """A tool without a name moved robot a, though the agent looked after another."""
+    base = load_config(None, {"data": str(tmp_path), "world": "empty", "lockstep": True})
+    robots = RobotConfig("a", "universal", ADDRESS), RobotConfig("b", "universal", free_addresses(1))
+    runtime = Runtime(replace(base, robots=robots, console=ConsoleConfig(port=0)))
+    await runtime.start()
+    console = known(runtime.console)
+    await console.ready()
+    try:
+        async with tools_of(console.address) as client:
+            for tool in ("where_am_i", "drive", "stop", "map_picture"):
+                assert "say which robot; there are a, b" in await refusal(client, tool)
+            assert (await call(client, "where_am_i", robot="b"))["name"] == "b"
+    finally:
+        await runtime.close()
 
 
 WRONG: list[tuple[str, dict[str, Any], str]] = [

@@ -23,11 +23,10 @@ from roboglot.spelling import WORD_MAX, instead
 T = TypeVar("T")
 SECONDS_MAX = 120.0  # a tool's longest wait for an action or a program
 LOOK = 0.1  # s between two checks of a running action
-DEFAULT = "a"
 
 # no slash: it would become a path to something else of the console
-ROBOT = Field(min_length=1, max_length=80, pattern="^[^/]+$", description="The robot's name, as `robots` lists it.")
-Robot = Annotated[str, ROBOT]
+NAME = Annotated[str, Field(min_length=1, max_length=80, pattern="^[^/]+$")]
+Robot = Annotated[NAME | None, Field(description="A name that `robots` lists; needed if there are several.")]
 # strict: else the library reads true as 1
 Meters = Annotated[float, Field(ge=-10_000, le=10_000, strict=True)]
 Speed = Annotated[float, Field(ge=-10, le=10, strict=True)]
@@ -68,6 +67,12 @@ class _Begun(msgspec.Struct):
     """The answer to a verb that begins an action."""
 
     result: _Action
+
+
+class _Named(msgspec.Struct):
+    """One of the listed robots."""
+
+    name: str
 
 
 class _Faults(msgspec.Struct):
@@ -156,21 +161,21 @@ class Tools:
         found: list[dict[str, object]] = await _answer_of(self._console.get(list, "robots"))
         return found
 
-    async def where_am_i(self, robot: Robot = DEFAULT) -> dict[str, object]:
+    async def where_am_i(self, robot: Robot = None) -> dict[str, object]:
         """Return a robot's pose, actions, battery and faults, and who controls it."""
-        state: dict[str, object] = await _answer_of(self._console.get(dict, "robots", robot))
+        state: dict[str, object] = await _answer_of(self._console.get(dict, "robots", await self._chosen(robot)))
         keys = ("name", "pose", "velocity", "actions", "control", "faults", "battery", "place", "safety", "body")
         return {key: state[key] for key in keys if key in state}
 
-    async def look(self, robot: Robot = DEFAULT) -> Image:
+    async def look(self, robot: Robot = None) -> Image:
         """Take a picture with the robot's camera."""
-        return Image(data=await _answer_of(self._console.fetch("robots", robot, "camera.jpg")), format="jpeg")
+        return Image(data=await self._picture(robot, "camera.jpg"), format="jpeg")
 
-    async def map_picture(self, robot: Robot = DEFAULT) -> Image:
+    async def map_picture(self, robot: Robot = None) -> Image:
         """Draw the robot's map from above, with the robot on it."""
-        return Image(data=await _answer_of(self._console.fetch("robots", robot, "map.png")), format="png")
+        return Image(data=await self._picture(robot, "map.png"), format="png")
 
-    async def go_to(self, x: Meters, y: Meters, robot: Robot = DEFAULT, wait: Wait = 60.0) -> dict[str, object]:
+    async def go_to(self, x: Meters, y: Meters, robot: Robot = None, wait: Wait = 60.0) -> dict[str, object]:
         """Drive to a point of the map around obstacles; return the outcome."""
         return await self._act(robot, "go_to", {"points": [[x, y]]}, wait)
 
@@ -180,38 +185,40 @@ class Tools:
         y: Speed = 0.0,
         yaw: Speed = 0.0,
         seconds: Moment = 1.0,
-        robot: Robot = DEFAULT,
+        robot: Robot = None,
     ) -> dict[str, object]:
         """Drive with a velocity (m/s ahead, m/s left, rad/s) for at most 2 s, then brake."""
         values = {"x": x, "y": y, "yaw": yaw, "seconds": seconds}
         return await self._act(robot, "drive", values, seconds + 5.0)
 
-    async def stop(self, robot: Robot = DEFAULT) -> str:
+    async def stop(self, robot: Robot = None) -> str:
         """Stop what moves the robot, no matter who began it, and its programs; delivery orders wait for a person."""
-        await _answer_of(self._console.post(dict, "robots", robot, "stop", values={}))
+        await _answer_of(self._console.post(dict, "robots", await self._chosen(robot), "stop", values={}))
         return "it stands"
 
-    async def rehearse(self, plan: Plan, robot: Robot = DEFAULT) -> dict[str, object]:
+    async def rehearse(self, plan: Plan, robot: Robot = None) -> dict[str, object]:
         """Try a plan in a copy of the simulated world first: how each step ends, what the robot would hit, where it
         would go. The robot itself does not move. `safe` is true if all succeeds and nothing is touched."""
         steps = [step.model_dump() for step in plan]
+        name = await self._chosen(robot)
         found: dict[str, object] = await _answer_of(
-            self._console.post(dict, "robots", robot, "rehearse", values={"steps": steps})
+            self._console.post(dict, "robots", name, "rehearse", values={"steps": steps})
         )
         return found
 
     async def run_program(
         self,
         source: Annotated[str, Field(min_length=1, max_length=65_536)],
-        robot: Robot = DEFAULT,
+        robot: Robot = None,
         wait: Wait = 60.0,
     ) -> dict[str, object]:
         """Run a block program (restricted Python, docs/programs/language.md); its state and the lines it printed."""
+        name = await self._chosen(robot)
         run: dict[str, object] = await _answer_of(
-            self._console.post(dict, "robots", robot, "program", values={"source": source})
+            self._console.post(dict, "robots", name, "program", values={"source": source})
         )
         async for _ in _beats(wait):
-            run = await _answer_of(self._console.get(dict, "robots", robot, "program"))
+            run = await _answer_of(self._console.get(dict, "robots", name, "program"))
             if run["state"] not in ("run", "run_wait"):
                 break
         return run
@@ -219,7 +226,7 @@ class Tools:
     async def inject_fault(
         self,
         kind: Annotated[str, Field(min_length=1, max_length=80)],
-        robot: Robot | None = None,
+        robot: NAME | None = None,
         seconds: Annotated[float, Field(gt=0, le=86_400, strict=True)] | None = None,
     ) -> list[int]:
         """Break something of the simulation on purpose (needs the right to administer); the faults' numbers."""
@@ -231,18 +238,31 @@ class Tools:
         await _answer_of(self._console.post(dict, "world", "clear_fault", values={}))
         return "mended"
 
-    async def _act(self, robot: str, verb: str, values: Mapping[str, object], wait: float) -> dict[str, object]:
+    async def _chosen(self, robot: str | None) -> str:
+        """Return the robot that was named, or the only one. Raises ToolError if there are several."""
+        if robot is not None:
+            return robot
+        names = [one.name for one in await _answer_of(self._console.get(list[_Named], "robots"))]
+        if len(names) != 1:
+            raise ToolError(f"say which robot{instead('', names)}")
+        return names[0]
+
+    async def _picture(self, robot: str | None, file: str) -> bytes:
+        return await _answer_of(self._console.fetch("robots", await self._chosen(robot), file))
+
+    async def _act(self, robot: str | None, verb: str, values: Mapping[str, object], wait: float) -> dict[str, object]:
         """Start an action and wait for its end, at most ``wait`` s."""
-        begun = await _answer_of(self._console.post(_Begun, "robots", robot, verb, values=values))
+        name = await self._chosen(robot)
+        begun = await _answer_of(self._console.post(_Begun, "robots", name, verb, values=values))
         number = begun.result.action
         seen: dict[str, object] = {"id": number, "status": "ACCEPTED"}
         async for _ in _beats(wait):
-            state = await _answer_of(self._console.get(_State, "robots", robot))
+            state = await _answer_of(self._console.get(_State, "robots", name))
             listed = [*state.actions, *state.history]
             seen = next((action for action in listed if action["id"] == number), seen)
             if seen["status"] in ("SUCCEEDED", "CANCELED", "ABORTED"):
                 break
-        pose = (await _answer_of(self._console.get(_State, "robots", robot))).pose
+        pose = (await _answer_of(self._console.get(_State, "robots", name))).pose
         known = {key: seen[key] for key in ("id", "status", "reason") if key in seen}
         return known | {"pose": [None if value is None else round(value, 3) for value in pose]}
 
