@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Sequence
+from contextlib import closing, suppress
 from ipaddress import IPv4Address
 from pathlib import Path
 
@@ -29,9 +30,9 @@ from roboglot.wire.robomaster.replies import PROFILES
 
 __all__ = ["RoboMasterDoor", "implemented"]
 
-# Addresses of a robot on its own Wi-Fi or a USB cable: clients know them, so it announces nothing.
 CONNECTIONS_MAX = {"video": MEDIA_CONNECTIONS_MAX, "audio": MEDIA_CONNECTIONS_MAX, "pilot": PILOTS_MAX}
 PORT_RIGHTS = {"pilot": Right.DRIVE}  # required to connect; all other ports require SEE
+# Addresses of a robot on its own Wi-Fi or a USB cable: clients know them, so it announces nothing.
 KNOWN_ADDRESSES = frozenset({"192.168.2.1", "192.168.42.2"})
 
 
@@ -67,7 +68,7 @@ class RoboMasterDoor:
         """Listen on all ports and announce the robot. Raises OSError naming an address that is taken."""
         loop = asyncio.get_running_loop()
         try:
-            everywhere = IPv4Address(self._address).is_unspecified
+            IPv4Address(self._address)
         except ValueError:
             raise OSError(f"{self._address} is not an IPv4 address, and the text protocol needs one") from None
         ports: dict[str, tuple[Callable[[], asyncio.Protocol], int | None]] = {
@@ -92,7 +93,7 @@ class RoboMasterDoor:
             raise
         if (responder := self.context.robot.responder) is not None:
             self._leave_responder = responder.join(self.name, self._play)
-        if not everywhere and self._address not in KNOWN_ADDRESSES:
+        if self._address not in KNOWN_ADDRESSES:
             self._announcing = loop.create_task(
                 announce(self.context, self._address, self._broadcast), name="robomaster ip"
             )
@@ -183,7 +184,12 @@ class RoboMasterDoor:
         if tap.watched:
             tap.push("robomaster", to, key_of(message), message)
 
-    def _broadcast(self, datagram: bytes) -> None:
-        self._note(datagram, f"{broadcast_address(self._address)}:{self._config.broadcast_port}")
-        if self._datagrams:
-            self._datagrams.send(datagram, broadcast_address(self._address), self._config.broadcast_port)
+    def _broadcast(self, datagram: bytes, own: str) -> None:
+        """Broadcast to the network of one of the robot's own addresses."""
+        to, port = broadcast_address(own), self._config.broadcast_port
+        self._note(datagram, f"{to}:{port}")
+        if own == self._address and self._datagrams:
+            self._datagrams.send(datagram, to, port)
+        elif own not in KNOWN_ADDRESSES:
+            with suppress(OSError), closing(Datagrams(own)) as datagrams:  # the address may have gone
+                datagrams.send(datagram, to, port)

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from ipaddress import IPv4Address
 
 from roboglot.protocols.robomaster.context import Context
+from roboglot.protocols.robomaster.datagrams import own_addresses
 
 PERIOD = 2.0  # s between two broadcasts
 
 
-async def announce(context: Context, address: str, send: Callable[[bytes], None]) -> None:
-    """Broadcast ``address`` until cancelled."""
-    message = context.profile.broadcast(address)
+async def announce(context: Context, address: str, send: Callable[[bytes, str], None]) -> None:
+    """Broadcast ``address`` until cancelled: ``send`` gets the datagram and the address to send it from.
+
+    A robot at 0.0.0.0 has each address of this machine, and tells each network the one that is reached from there.
+    """
+    everywhere = IPv4Address(address).is_unspecified
     async for _ in context.robot.clock.every(PERIOD):
         if not context.active:
-            send(message)
+            for own in own_addresses() if everywhere else [address]:
+                send(context.profile.broadcast(own), own)
