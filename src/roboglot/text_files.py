@@ -95,14 +95,19 @@ def tables_in(folder: Path) -> list[Path]:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a place beside ``path`` for a file that replaces it once it is whole; one that is not is deleted."""
+    """Yield a place beside ``path`` for a file that replaces it once it is whole; one that is not is deleted.
+
+    Errors of the system that name no file name ``path``.
+    """
     place = Path(os.path.realpath(path))  # a link stays one
     fresh = place.with_name(f"{place.name}.new")
     try:
         yield fresh
         fresh.replace(place)
-    except BaseException:
+    except BaseException as error:
         fresh.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            error.filename = error.filename or str(place)  # a full disk has none
         raise
 
 

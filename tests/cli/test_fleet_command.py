@@ -18,7 +18,8 @@ import pytest
 from roboglot.cli import fleet
 from roboglot.hosting.folder_lock import lock_folder
 from roboglot.shards import nursery_client, serving
-from roboglot.shards.plan import PLAN, load, plan_fleet, save
+from roboglot.shards.folder_before import FolderBefore
+from roboglot.shards.plan import load, plan_fleet, save
 from roboglot.shards.requests import Answer, RobotRow, Row
 from roboglot.shards.states import DETACHED, Shards, State
 from roboglot.testing.addresses import free_addresses
@@ -27,6 +28,22 @@ if TYPE_CHECKING:
     from roboglot.shards.fleet_host import FleetHost
 
 TEMPLATE = 'world = "moon"\n'
+
+
+def before(folder: Path) -> FolderBefore:
+    found = FolderBefore(folder)
+    found.look()
+    return found
+
+
+def write(*paths: Path) -> None:
+    for path in paths:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("content")
+
+
+async def zero() -> float:
+    return 0.0
 
 
 class Hopeless:
@@ -47,6 +64,7 @@ class Hopeless:
         self.folder.mkdir(exist_ok=True)
         save(self.plan, self.folder)
         for shard in self.shards.values():
+            write(shard.folder / "log", self.folder / "nodes" / "1" / "shards" / shard.plan.name / "log")
             shard.hopeless, shard.reason = True, "no world is named 'moon'"
             self.shards.turn_to(shard, State.FAILED)
         return 0.0
@@ -86,7 +104,7 @@ async def test_a_fleet_is_ready_with_its_first_world(
 ) -> None:
     host, said = Late(tmp_path), list[str]()
     serving_it = asyncio.ensure_future(
-        serving.serve(lambda: cast("FleetHost", host), tmp_path, said.append, 0.0, lasting=lasting)
+        serving.serve(lambda: cast("FleetHost", host), before(tmp_path), said.append, 0.0, lasting=lasting)
     )
     async with asyncio.timeout(10.0):
         while "no world is up yet: 127.0.0.1:1448 is in use" not in caplog.text:  # noqa: ASYNC110 - there is no event of it
@@ -109,7 +127,7 @@ async def test_an_interrupted_start_keeps_no_new_plan(known: bool, lasting: bool
     if known:
         save(old, tmp_path)
     with pytest.raises(serving.Interrupted, match="before all worlds were up"):
-        await serving.serve(lambda: cast("FleetHost", host), tmp_path, print, 0.0, lasting=lasting)
+        await serving.serve(lambda: cast("FleetHost", host), before(tmp_path), print, 0.0, lasting=lasting)
     assert host.closed
     assert load(tmp_path) == (host.plan if lasting else old if known else None)
 
@@ -118,23 +136,81 @@ async def test_a_lost_cluster_ends_the_command(tmp_path: Path) -> None:
     host = Unfinished(tmp_path)
     host.loss = OSError("raylet has ended")
     with pytest.raises(OSError, match="raylet has ended"):
-        await serving.serve(lambda: cast("FleetHost", host), tmp_path, print, 0.0, lasting=False)
+        await serving.serve(lambda: cast("FleetHost", host), before(tmp_path), print, 0.0, lasting=False)
     assert host.closed
 
 
-@pytest.mark.parametrize("known", [False, True])
-def test_fleet_without_a_world_leaves_no_plan(known: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("known", ["plan", "folder", "nothing"])
+def test_fleet_without_a_world_leaves_nothing(known: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(nursery_client, "launched", lambda **_: nullcontext(None))
-    host, template, folder = Hopeless(tmp_path / "f"), tmp_path / "class.toml", tmp_path / "f"
+    template, home = tmp_path / "class.toml", tmp_path / "home"
+    folder = home / "f"
+    host = Hopeless(folder)
     template.write_text(TEMPLATE)
     monkeypatch.setattr(fleet, "_fleet_host", lambda *_: host)
-    folder.mkdir()
-    if known:
+    if known != "nothing":
+        write(folder / "shards" / "w1" / "data" / "programs", folder / "shards" / "w1" / "log", folder / "own")
+    if known == "plan":
         save(host.plan, folder)
+    files = sorted(home.rglob("*"))
     with pytest.raises(SystemExit, match=r"^roboglot fleet: no world can start: no world is named 'moon'$"):
-        fleet.up(worlds=0 if known else 2, template=None if known else template, data=folder)
+        fleet.up(worlds=0 if known == "plan" else 2, template=None if known == "plan" else template, data=folder)
     assert host.closed
-    assert (folder / PLAN).exists() is known, "only a plan that was up before is kept"
+    assert sorted(home.rglob("*")) == files
+    assert home.exists() is (known != "nothing")
+
+
+def test_a_cluster_that_is_absent_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError("no Ray head answers there")
+
+    monkeypatch.setattr(fleet, "_joined", refuse)
+    with pytest.raises(SystemExit, match="no Ray head answers there"):
+        fleet.up(worlds=2, first_address=free_addresses(2), on="ray://head", data=tmp_path / "f")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("was_up", [False, True])
+async def test_an_interrupted_start_keeps_stored_data(was_up: bool, tmp_path: Path) -> None:
+    host, folder = Unfinished(tmp_path / "f"), tmp_path / "f"
+    folder.mkdir()
+    found = before(folder)
+    if was_up:
+        host.shards.turn_to(host.shards["w2"], State.READY)
+    with pytest.raises(serving.Interrupted):
+        await serving.serve(lambda: cast("FleetHost", host), found, print, 0.0, lasting=False)
+    write(folder / "shards" / "w2" / "data")
+    found.clear()
+    assert (folder / "shards").exists() is was_up
+
+
+async def test_data_outlives_a_cluster_that_is_lost(tmp_path: Path) -> None:
+    host = Late(tmp_path)
+    found = before(tmp_path)
+    for shard in host.shards.values():
+        host.shards.turn_to(shard, State.READY)
+
+    def lose(line: str) -> None:
+        if line == "ready":
+            host.ended.set_exception(OSError("raylet has ended"))
+
+    host.start = zero  # type: ignore[method-assign]
+    with pytest.raises(OSError, match="raylet has ended"):
+        await serving.serve(lambda: cast("FleetHost", host), found, lose, 0.0, lasting=False)
+    write(tmp_path / "shards" / "w1" / "data")
+    found.clear()
+    assert (tmp_path / "shards" / "w1" / "data").exists()
+
+
+async def test_reasons_are_logged_once_some_world_is_up(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    host = Hopeless(tmp_path)
+    await host.start()
+    for shard in host.shards.values():
+        host.shards.refused(shard)
+    assert caplog.messages == [], "the command may end with the same words"
+    host.shards.report_hopeless()
+    host.shards.refused(host.shards["w2"])
+    assert caplog.messages == ["shard w1 cannot start: no world is named 'moon'"]
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,9 @@ os.environ["RAY_AUTH_MODE"] = "disabled"  # no token in the home folder
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 
 import ray
+from ray.exceptions import RayTaskError
 
+from roboglot.extras import own_version
 from roboglot.shards import cluster as cluster_module
 from roboglot.shards.actor import Condition
 from roboglot.shards.cluster import ClusterFleet, _answer, refuse_unfenced
@@ -101,6 +103,7 @@ def condition_of(
         reason=reason,
         hopeless=hopeless,
         lines=["a line"],
+        version=own_version(),
     )
 
 
@@ -111,6 +114,7 @@ class FakeRay(SimpleNamespace):
         super().__init__(names=list(names), util=SimpleNamespace(list_named_actors=lambda: list(self.names)))
         self.failure: Exception | None = None
         self.refusal: Refusal | None = None
+        self.foreign: bytes | Exception = b""  # answer of another version of roboglot
         self.looks = 0
 
     def remote(self, _: type) -> FakeRay:
@@ -134,10 +138,13 @@ class FakeRay(SimpleNamespace):
             raise self.failure
         answer = Future[bytes]()
         self.looks += 1
+        if isinstance(self.foreign, Exception):
+            answer.set_exception(self.foreign)
+            return SimpleNamespace(future=lambda: answer)
         condition = condition_of(State.READY)
         if self.refusal is not None:
             condition = condition_of(State.FAILED, reason=self.refusal.reason, hopeless=self.refusal.lasting)
-        answer.set_result(msgspec.json.encode(condition))
+        answer.set_result(self.foreign or msgspec.json.encode(condition))
         return SimpleNamespace(future=lambda: answer)
 
 
@@ -176,22 +183,25 @@ async def test_detached_shards_are_known_until_ended(
         assert detached_on(tmp_path) == known
 
 
+@pytest.mark.parametrize("lasting", [False, True])
 async def test_a_shard_that_cannot_start_is_logged_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    lasting: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Its actor goes on, since another try would fail, too, and reports the same at each look."""
     fake = FakeRay()
-    fake.refusal = Refusal("no body is named 'herms'", lasting=True)
+    fake.refusal = Refusal("no body is named 'herms'", lasting=lasting)
     monkeypatch.setattr(cluster_module, "ray", fake)
     monkeypatch.setattr(cluster_module, "PERIOD", 0.001)
-    fleet = ClusterFleet(plan_fleet(1, 1, {}, tmp_path), tmp_path, "local")
+    fleet = ClusterFleet(plan_fleet(1, 1, {}, tmp_path), tmp_path, "ray://head", lasting=lasting)
     await fleet.start()
     async with asyncio.timeout(PATIENCE):
         while fake.looks < 10:  # noqa: ASYNC110 - there is no event of it
             await asyncio.sleep(0.001)
-    assert (fleet.shards["w1"].state, fleet.shards["w1"].hopeless) == (State.FAILED, True)
-    assert caplog.messages == ["shard w1 did not start: no body is named 'herms'"]
+    assert (fleet.shards["w1"].state, fleet.shards["w1"].hopeless) == (State.FAILED, lasting)
+    assert caplog.messages == ([] if lasting else ["shard w1 did not start: no body is named 'herms'"])
+    assert fake.names
     await fleet.close()
+    assert (fake.names, detached_on(tmp_path)) == ([], ""), "no detached shard stays that cannot start"
 
 
 @pytest.mark.parametrize("part", ["raylet", "gcs_server"])
@@ -282,3 +292,56 @@ async def test_a_failed_look_is_not_the_last(
     assert len([record for record in caplog.records if record.levelname == "WARNING"]) == 1
     await fleet.close()
     assert fake.names == []
+
+
+MISSING = RayTaskError("look", "a traceback", TypeError("look() takes 1 positional argument but 2 were given"))
+
+
+@pytest.mark.parametrize(
+    ("foreign", "runs"),
+    [
+        (b'{"version": "0.3.1", "pid": 1}', f"runs roboglot 0.3.1, not {own_version()}"),
+        (b'{"pid": 1}', "runs another version of roboglot"),
+        (b"\x80", "runs another version of roboglot"),
+        (MISSING, "runs another version of roboglot"),
+        (TypeError("too many arguments"), "runs another version of roboglot"),
+    ],
+)
+async def test_shard_of_another_version_is_named(
+    foreign: bytes | Exception,
+    runs: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    fake = FakeRay()
+    fake.foreign = foreign
+    monkeypatch.setattr(cluster_module, "ray", fake)
+    monkeypatch.setattr(cluster_module, "PERIOD", 0.001)
+    fleet = ClusterFleet(plan_fleet(1, 1, {}, tmp_path), tmp_path, "ray://head", lasting=True)
+    await fleet.start()
+    shard, looks = fleet.shards["w1"], fake.looks
+    async with asyncio.timeout(PATIENCE):
+        while fake.looks < looks + 5:  # noqa: ASYNC110 - there is no event of it
+            await asyncio.sleep(0.001)
+    why = f"it {runs}; restart it: `roboglot fleet restart w1`"
+    assert (shard.state, shard.reason, shard.hopeless) == (State.FAILED, why, False)
+    assert caplog.messages == [f"shard w1 cannot be served: {why}"]
+    fake.foreign = b""
+    await fleet.restart(shard)
+    assert (shard.state, shard.reason) == (State.READY, "")
+    await fleet.close()
+
+
+async def test_slow_actor_is_missed_not_failed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its supervisor had no time to answer."""
+    fake = FakeRay()
+    monkeypatch.setattr(cluster_module, "ray", fake)
+    fleet = ClusterFleet(plan_fleet(1, 1, {}, tmp_path), tmp_path, "local")
+    await fleet.start()
+    fake.foreign = RayTaskError("look", "a traceback", TimeoutError())
+    await fleet._look(fleet.shards["w1"])
+    assert fleet.shards["w1"].state is State.STARTING
+    assert fleet.shards["w1"].reason.startswith("it does not answer; Ray starts it again")
+    fake.foreign = b""
+    await fleet.close()

@@ -122,6 +122,7 @@ async def test_one_with_wrong_settings_is_not_retried(supervisor: Supervisor) ->
 
 
 async def test_a_reason_of_all_is_logged_once(supervisor: Supervisor, caplog: pytest.LogCaptureFixture) -> None:
+    supervisor.shards.report_hopeless()
     for number in (1, 2):
         nursery_of(supervisor).say(number, Refusal("there is no world 'moon'", lasting=True))
         nursery_of(supervisor).die(number, 1)

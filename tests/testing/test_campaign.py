@@ -130,8 +130,9 @@ def test_report_that_fills_the_disk_is_deleted(tmp_path: Path) -> None:
             fresh.write_text("half")
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    with pytest.raises(OSError, match="No space"):
+    with pytest.raises(OSError, match="No space") as failed:
         write()
+    assert failed.value.filename == str(page)
     assert [file.name for file in tmp_path.iterdir()] == ["report.md"]
     assert page.read_text() == "before"
 

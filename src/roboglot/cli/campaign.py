@@ -72,14 +72,16 @@ def command(
         print(f"{len(trials) - len(left)} of {len(trials)} trials are in {table.path} already")
     try:
         interrupted = _play(left, table, _player(on, [each.path.parent for each in found], workers, longest))
+        passed = _write(table, folder, trials)
     except (MissingExtra, OSError, ValueError) as bad:
         print(f"roboglot campaign: {visible(in_words(bad))}", file=sys.stderr)
         if table.rows:
             with suppress(OSError):  # a full disk may be what ended it
                 _write(table, folder, trials)
             print("the same command resumes", file=sys.stderr)
+        with suppress(OSError):
+            table.close()
         raise typer.Exit(2) from None
-    passed = _write(table, folder, trials)
     if interrupted:
         raise typer.Exit(130)
     raise typer.Exit(0 if passed else 1)

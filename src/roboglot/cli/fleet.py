@@ -27,6 +27,7 @@ from roboglot.hosting.escaping import visible
 
 if TYPE_CHECKING:
     from roboglot.shards.fleet_host import FleetHost
+    from roboglot.shards.folder_before import FolderBefore
     from roboglot.shards.nursery_client import StartedNursery
     from roboglot.shards.plan import FleetPlan
     from roboglot.shards.requests import Answer, Row, Verb
@@ -91,8 +92,8 @@ def up(
                 raise ValueError("--memory-max is for shards without --on: Ray places and limits its own")
             where = _MachineOptions(on, detached, memory_max << 20, nursery)
             say = partial(print, file=sys.stdout, flush=True)  # also where a cluster has it print to standard error
-            with _planned(folder, asked, replan=replan) as plan, _joined(plan, on):  # joining takes long
-                asyncio.run(serve(lambda: _fleet_host(plan, folder, where), folder, say, began, lasting=detached))
+            with _planned(folder, asked, replan=replan) as (plan, before), _joined(plan, on):  # joining takes long
+                asyncio.run(serve(lambda: _fleet_host(plan, folder, where), before, say, began, lasting=detached))
         except Interrupted as early:
             print(f"roboglot fleet: {early}", file=sys.stderr)
             sys.exit(INTERRUPTED)
@@ -288,20 +289,29 @@ def _plan(folder: Path, asked: _PlanOptions, *, replan: bool) -> FleetPlan:
 
 
 @contextmanager
-def _planned(folder: Path, asked: _PlanOptions, *, replan: bool) -> Iterator[FleetPlan]:
+def _planned(folder: Path, asked: _PlanOptions, *, replan: bool) -> Iterator[tuple[FleetPlan, FolderBefore]]:
     """Context with the plan, in which the folder is locked; one that is not there is made for a good plan only.
 
-    Raises FolderInUse, before what ``_plan`` raises: another program may be storing its plan. Raises OSError.
+    If the context fails, the folder is as it was ``before``, unless that is to be kept. Raises FolderInUse, before what
+    ``_plan`` raises: another program may be storing its plan. Raises OSError.
     """
     from roboglot.hosting.folder_lock import locked
+    from roboglot.shards.folder_before import FolderBefore
 
+    before, there = FolderBefore(folder), folder.is_dir()
     with ExitStack() as held:
-        if there := folder.is_dir():
+        if there:
             held.enter_context(locked(folder))
-        plan = _plan(folder, asked, replan=replan)
-        if not there:
-            held.enter_context(locked(folder))
-        yield plan
+            before.look()
+        try:
+            plan = _plan(folder, asked, replan=replan)
+            if not there:
+                held.enter_context(locked(folder))
+                before.look()
+            yield plan, before
+        except BaseException:
+            before.clear()
+            raise
 
 
 class _MachineOptions(NamedTuple):

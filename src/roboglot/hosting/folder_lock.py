@@ -16,18 +16,23 @@ class FolderInUse(RuntimeError):
 
 def lock_folder(folder: Path) -> int:
     """Create the folder and lock it for this process, until that ends. Raises FolderInUse, OSError."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        lock = os.open(folder / "lock", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
-    except OSError as error:
-        number = errno.ENOTDIR if isinstance(error, FileExistsError) else error.errno or 0
-        raise OSError(number, f"{os.strerror(number)}; choose another folder with --data", str(folder)) from None
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(lock)
-        raise FolderInUse(f"another roboglot uses {folder}; stop it, or choose another folder with --data") from None
-    return lock
+    while True:
+        try:
+            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            lock = os.open(folder / "lock", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
+        except OSError as error:
+            number = errno.ENOTDIR if isinstance(error, FileExistsError) else error.errno or 0
+            raise OSError(number, f"{os.strerror(number)}; choose another folder with --data", str(folder)) from None
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(lock)
+            why = f"another roboglot uses {folder}; stop it, or choose another folder with --data"
+            raise FolderInUse(why) from None
+        with contextlib.suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(lock), os.stat(folder / "lock")):
+                return lock
+        os.close(lock)  # a fleet that did not start has deleted this file meanwhile
 
 
 @contextlib.contextmanager

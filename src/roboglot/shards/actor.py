@@ -19,6 +19,7 @@ from pathlib import Path
 
 import msgspec
 
+from roboglot.extras import own_version
 from roboglot.shards.messages import Beat, Ready
 from roboglot.shards.states import LOG_FILE, Shard, State
 
@@ -40,6 +41,7 @@ class Condition(msgspec.Struct):
 
     ``run``: a number that differs in every actor's process, unlike pids of different machines; ``restarts``: of the
     shard in this run. ``ready`` is left out if the client has it already, as a hundred robots' endpoints are long.
+    ``version``: of roboglot.
     """
 
     pid: int
@@ -53,11 +55,18 @@ class Condition(msgspec.Struct):
     reason: str
     hopeless: bool
     lines: list[str]
+    version: str
 
     @property
     def birth(self) -> int:
         """Number of this start of the shard."""
         return self.run + self.restarts
+
+
+class Version(msgspec.Struct):
+    """The part of a Condition that every version of roboglot understands; the first ones sent none."""
+
+    version: str = ""
 
 
 class _Lines(logging.Handler):
@@ -157,8 +166,9 @@ class ShardActor:
         if (shard := self._shard) is None:
             nothing = Beat(0.0, 0, 0.0)
             state = State.FAILED if self._reason else State.STARTING
+            reason, version = self._reason, own_version()
             return msgspec.json.encode(
-                Condition(0, self._node, self._run, 0, state, 0.0, None, nothing, self._reason, False, lines)
+                Condition(0, self._node, self._run, 0, state, 0.0, None, nothing, reason, False, lines, version)
             )
         condition = Condition(
             pid=shard.pid,
@@ -172,6 +182,7 @@ class ShardActor:
             reason=shard.reason or ("" if shard.state is State.READY else self._reason),
             hopeless=shard.hopeless and shard.state is State.FAILED,  # else the reason has not come yet
             lines=lines,
+            version=own_version(),
         )
         if condition.birth == known:
             condition.ready = None
@@ -201,6 +212,7 @@ class ShardActor:
             supervisor = Supervisor(plan, self._folder, start=partial(connect, self._nursery))
             try:
                 (self._shard,) = supervisor.shards.values()
+                supervisor.shards.report_hopeless()
                 await supervisor.start()
                 self._reason = ""
                 await supervisor.ended  # it never does by itself

@@ -11,15 +11,15 @@ import logging
 import sqlite3
 from collections.abc import Iterator
 from concurrent.futures import Future
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Protocol
 
 import msgspec
 
-from roboglot.extras import explaining
+from roboglot.extras import explaining, own_version
 from roboglot.hosting.error_text import in_words
-from roboglot.shards.actor import Condition, ShardActor
+from roboglot.shards.actor import Condition, ShardActor, Version
 from roboglot.shards.joining import LOCAL, NAMESPACE
 from roboglot.shards.messages import Beat
 from roboglot.shards.plan import FleetPlan, ShardPlan, save
@@ -33,7 +33,7 @@ from roboglot.transport.log_limiter import LogLimiter
 
 with explaining("--on", "fleet"):
     import ray
-    from ray.exceptions import RayActorError, RayError
+    from ray.exceptions import RayActorError, RayError, RayTaskError
 
 log = logging.getLogger(__name__)
 PERIOD = 1.0  # s between two checks of each shard
@@ -113,13 +113,13 @@ class ClusterFleet:
         return 0.0
 
     async def close(self) -> None:
-        """Stop all shards, unless ``lasting``."""
+        """Stop all shards, unless ``lasting`` and one of them can start."""
         self.shards.end()
         tasks = [task for task in (self._watch, self._registry_watch) if task is not None]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        if not self._lasting:
+        if not self._lasting or all(shard.hopeless for shard in self.shards.values()):
             ends = await asyncio.gather(*map(self._end, self.shards.values()), return_exceptions=True)
             for error in ends:
                 if isinstance(error, Exception):
@@ -218,17 +218,31 @@ class ClusterFleet:
             return
         last = self._seen_last.get(shard.plan.name)
         known = last.birth if last is not None and shard.ready else 0
+        answer = b""
         try:
             answer = await asyncio.wait_for(_answer(actor.look.remote(known)), LOOK_MAX)
-        except (RayActorError, TimeoutError):
-            self._missed(shard)
-            return
-        except RayError as error:
-            shard.reason = _first_line(error)
-            self.shards.turn_to(shard, State.FAILED)
-            raise
-        if actor is self._actors.get(shard.plan.name):
-            self._seen(shard, msgspec.json.decode(answer, type=Condition))
+            condition = msgspec.json.decode(answer, type=Condition)
+        except (RayError, TimeoutError, TypeError, AttributeError, msgspec.DecodeError) as error:
+            match _cause(error):
+                case RayActorError() | TimeoutError():
+                    self._missed(shard)
+                case TypeError() | AttributeError() | msgspec.DecodeError():
+                    self._cannot_read(shard, answer)
+                case _:
+                    shard.reason = _first_line(error)
+                    self.shards.turn_to(shard, State.FAILED)
+                    raise
+        else:
+            if actor is self._actors.get(shard.plan.name):
+                self._seen(shard, condition)
+
+    def _cannot_read(self, shard: Shard, answer: bytes) -> None:
+        """Handle the answer of an actor that another version of roboglot started; empty: it has no such method."""
+        reason = f"it {_version_in(answer)}; restart it: `roboglot fleet restart {shard.plan.name}`"
+        if reason != shard.reason:
+            log.warning("shard %s cannot be served: %s", shard.plan.name, reason)
+        shard.reason, shard.ready, shard.beat = reason, None, Beat(0.0, 0, 0.0)
+        self.shards.turn_to(shard, State.FAILED)
 
     def _missed(self, shard: Shard) -> None:
         if shard.state is State.READY:
@@ -240,12 +254,15 @@ class ClusterFleet:
     def _seen(self, shard: Shard, condition: Condition) -> None:
         name = shard.plan.name
         is_new = self._count(shard, condition)
-        if condition.state is State.FAILED and condition.reason not in ("", shard.reason):
-            log.warning("shard %s did not start: %s", name, condition.reason)  # it reports the same at each look
+        is_news = condition.state is State.FAILED and condition.reason not in ("", shard.reason)
         shard.pid, self._nodes[name], self._seen_last[name] = condition.pid, condition.node, condition
         shard.heard = self._loop.time()
         shard.ready = (condition.ready or shard.ready) if condition.state is State.READY else None
         shard.beat, shard.reason, shard.hopeless = condition.beat, condition.reason, condition.hopeless
+        if is_news and shard.hopeless:
+            self.shards.refused(shard)
+        elif is_news:
+            log.warning("shard %s did not start: %s", name, shard.reason)  # it reports the same at each look
         if is_new or condition.state is not shard.state:
             self.shards.turn_to(shard, condition.state)
         shard.silent = condition.silent
@@ -275,8 +292,23 @@ def _in_a_sentence() -> Iterator[None]:
         raise OSError(_first_line(error)) from None
 
 
+def _version_in(answer: bytes) -> str:
+    """Return which version sends this answer, which this one cannot read."""
+    with suppress(msgspec.DecodeError):
+        version = msgspec.json.decode(answer, type=Version).version
+        if version not in ("", own_version()):
+            return f"runs roboglot {version}, not {own_version()}"
+    return "runs another version of roboglot"
+
+
+def _cause(error: Exception) -> Exception:
+    """Return the error that a call raised in its actor; ``error`` if that is Ray's own."""
+    return error.cause if isinstance(error, RayTaskError) else error
+
+
 def _first_line(error: Exception) -> str:
-    return (in_words(error).strip().splitlines() or [type(error).__name__])[0]
+    cause = _cause(error)
+    return (in_words(cause).strip().splitlines() or [type(cause).__name__])[0]
 
 
 async def _answer(reference: Reference) -> bytes:

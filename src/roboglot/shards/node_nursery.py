@@ -15,11 +15,11 @@ import socket
 import sys
 import time
 from collections.abc import Callable
-from typing import NoReturn
+from functools import partial
 
 from roboglot.shards.node_client import user_of
 from roboglot.shards.nursery import LINK_FD, close_above, serve, take_signals
-from roboglot.shards.warm_up import ended, fork, wake_at_ends, warm
+from roboglot.shards.warm_up import become, ended, fork, wake_at_ends, warm
 
 IDLE = 30.0  # s without a connection
 
@@ -70,26 +70,18 @@ class NodeNursery:
             sys.stderr.write(f"cannot serve a connection: {error}\n")
             return
         if pid == 0:
-            self._become_nursery(connection)
+            become(partial(self._become_nursery, connection))
         self._children.add(pid)
 
-    def _become_nursery(self, connection: socket.socket) -> NoReturn:
+    def _become_nursery(self, connection: socket.socket) -> int:
         """Serve one connection, in the child; that hangs up when this process ends, after its shards."""
-        status = 1
-        try:
-            os.dup2(connection.fileno(), LINK_FD, inheritable=False)
-            close_above(LINK_FD)
-            for kind in (signal.SIGINT, signal.SIGTERM):
-                signal.signal(kind, signal.SIG_IGN)
-            control = socket.socket(fileno=os.dup(LINK_FD))
-            control.setblocking(True)
-            status = serve(control, self._run, self._loading)
-        except BaseException:  # noqa: BLE001 - a forked child has no caller to raise to
-            sys.excepthook(*sys.exc_info())
-        finally:
-            with contextlib.suppress(OSError, ValueError):
-                sys.stderr.flush()
-            os._exit(status)
+        os.dup2(connection.fileno(), LINK_FD, inheritable=False)
+        close_above(LINK_FD)
+        for kind in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(kind, signal.SIG_IGN)
+        control = socket.socket(fileno=os.dup(LINK_FD))
+        control.setblocking(True)
+        return serve(control, self._run, self._loading)
 
     def _reap(self) -> None:
         with contextlib.suppress(BlockingIOError):

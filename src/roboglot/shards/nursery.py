@@ -14,11 +14,12 @@ import socket
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 
 import msgspec
 
 from roboglot.shards.messages import MESSAGE_MAX, Birth, Born, Dead, End, Fork, NurseryRequest, Warm, encode
-from roboglot.shards.warm_up import ENVIRONMENT, EXIT_BROKEN, ended, fork, wake_at_ends, warm
+from roboglot.shards.warm_up import ENVIRONMENT, become, ended, fork, wake_at_ends, warm
 
 LAST_SECONDS = 12.0  # s for shards to close when the nursery ends
 LINK_FD = 3  # of a shard
@@ -79,22 +80,14 @@ class Nursery:
     def _fork(self, number: int, folder: str, link: int, output: int) -> None:
         pid = fork(take_signals)
         if pid == 0:
-            self._become_shard(folder, link, output)
+            become(partial(self._become_shard, folder, link, output))
         self._children[pid] = number
         self._send(Born(number, pid))
 
-    def _become_shard(self, folder: str, link: int, output: int) -> None:
-        """Become the shard, in the child; never returns."""
-        status = EXIT_BROKEN
-        try:
-            _take_descriptors(link, output)
-            status = self._run(folder, socket.socket(fileno=LINK_FD))
-        except BaseException:  # noqa: BLE001 - a forked child has no caller to raise to
-            sys.excepthook(*sys.exc_info())
-        finally:
-            with contextlib.suppress(OSError, ValueError):
-                sys.stderr.flush()
-            os._exit(status)
+    def _become_shard(self, folder: str, link: int, output: int) -> int:
+        """Run the shard, in the child; return its exit status."""
+        _take_descriptors(link, output)
+        return self._run(folder, socket.socket(fileno=LINK_FD))
 
     def _drain(self) -> None:
         with contextlib.suppress(BlockingIOError):

@@ -7,14 +7,12 @@ import logging
 import signal
 import time
 from collections.abc import Callable
-from pathlib import Path
 
-from roboglot.hosting.error_text import in_words
 from roboglot.shards.classes import FleetClasses
 from roboglot.shards.command_server import CommandServer
 from roboglot.shards.fleet_host import FleetHost
+from roboglot.shards.folder_before import FolderBefore
 from roboglot.shards.overview import Overview
-from roboglot.shards.plan import EarlierPlan
 from roboglot.shards.states import State
 
 log = logging.getLogger(__name__)
@@ -29,18 +27,24 @@ class Interrupted(Exception):
 
 
 async def serve(
-    fleet_host: Callable[[], FleetHost], folder: Path, say: Callable[[str], None], began: float, *, lasting: bool
+    fleet_host: Callable[[], FleetHost],
+    before: FolderBefore,
+    say: Callable[[str], None],
+    began: float,
+    *,
+    lasting: bool,
 ) -> None:
     """Keep the fleet up until a signal; ``say`` once a world is. Raises NoWorld, Interrupted, OSError.
 
-    A new plan is kept once the worlds are up, or when shards outlive this program (``lasting``).
+    A new plan is kept once the worlds are up, or when shards outlive this program (``lasting``); before, ``before`` is
+    brought back.
     """
     host = fleet_host()
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, _end, host.ended)
-    commands, classes = CommandServer(host, folder), FleetClasses(folder)
+    commands, classes = CommandServer(host, before.folder), FleetClasses(before.folder)
     page = Overview(host, _first_address(host))
-    earlier, keep = EarlierPlan(folder), lasting
+    before.is_kept = keep = lasting
     await classes.open()  # shards look for this socket when they start
     starting = asyncio.ensure_future(_until_up(host))
     try:
@@ -48,9 +52,10 @@ async def serve(
         await _either(host.ended, starting)
         if not starting.done():
             host.ended.result()
+            before.is_kept = lasting or _have_been_up(host)
             raise Interrupted(f"interrupted before all worlds were up{'; those that were started go on' * lasting}")
-        keep = keep and not isinstance(starting.exception(), NoWorld)
-        seconds, keep = starting.result(), True
+        before.is_kept = keep = keep and not isinstance(starting.exception(), NoWorld)
+        seconds, before.is_kept, keep = starting.result(), True, True
         page.open()
         say(up_text(host, time.monotonic() - began, seconds, page.address))
         say("ready")
@@ -65,7 +70,7 @@ async def serve(
         await page.close()
         await commands.close()  # before the host: a move must be over before the folder is released
         if not keep:
-            _restore(earlier)
+            before.restore_plan()
         await host.close()
         await classes.close()
 
@@ -95,20 +100,19 @@ async def _until_up(fleet_host: FleetHost) -> float:
     await fleet_host.shards.until(is_decided)
     if all(shard.hopeless for shard in shards):
         raise NoWorld(f"no world can start: {_reason(fleet_host)}")
+    fleet_host.shards.report_hopeless()
     return seconds
 
 
 def _reason(fleet_host: FleetHost) -> str:
-    return next((shard.reason for shard in fleet_host.shards.values() if shard.reason), "")
+    """Return why a shard is down, of one that tries again if there is one; empty: none is, or none says."""
+    down = sorted((shard for shard in fleet_host.shards.values() if shard.reason), key=lambda shard: shard.hopeless)
+    return down[0].reason if down else ""
 
 
-def _restore(earlier: EarlierPlan) -> None:
-    """Go back to the earlier plan, or none; on a full disk, the new one stays."""
-    try:
-        if earlier.restore():
-            log.warning("the new plan is not kept")
-    except OSError as error:
-        log.warning("the new plan stays: %s", in_words(error))
+def _have_been_up(fleet_host: FleetHost) -> bool:
+    """Return whether robots may have stored data."""
+    return any(shard.state is State.READY or shard.restarts for shard in fleet_host.shards.values())
 
 
 def _first_address(fleet_host: FleetHost) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import socket
 from collections.abc import Callable
 from enum import StrEnum
@@ -11,6 +12,7 @@ from pathlib import Path
 from roboglot.shards.messages import Beat, Ready
 from roboglot.shards.plan import FleetPlan, ShardPlan
 
+log = logging.getLogger(__name__)
 LOG_FILE = "log"
 DETACHED = "detached"  # file in the fleet's folder: the cluster on which its shards outlive `fleet up`
 LOG_MAX = 10 << 20  # bytes of a shard's log from which the next start begins a new one
@@ -74,7 +76,7 @@ class Shards(dict[str, Shard]):
             for number, shard in enumerate(plan.shards, start=1)
         )
         self._changed = asyncio.Event()  # set with every change of a state
-        self._ends = False
+        self._ends, self._reports_hopeless = False, False
         self._loop = asyncio.get_running_loop()
 
     def turn_to(self, shard: Shard, state: State) -> None:
@@ -83,6 +85,19 @@ class Shards(dict[str, Shard]):
         if state is State.STOPPED:
             shard.reason = ""
         self._changed.set()
+
+    def refused(self, shard: Shard) -> None:
+        """Log a hopeless shard's reason, once for all. Before ``report_hopeless``, `fleet up` may end with it."""
+        same = (other for other in self.values() if other.hopeless and other.reason == shard.reason)
+        if self._reports_hopeless and all(other is shard for other in same):
+            log.error("shard %s cannot start: %s", shard.plan.name, shard.reason)
+
+    def report_hopeless(self) -> None:
+        """Log the reason of each hopeless shard, as ``refused`` does from now on."""
+        self._reports_hopeless = True
+        reasons = {shard.reason: shard for shard in reversed(self.values()) if shard.hopeless}
+        for shard in reversed(reasons.values()):
+            log.error("shard %s cannot start: %s", shard.plan.name, shard.reason)
 
     def end(self) -> None:
         """Let every wait fail that has not come to its end, and all further ones."""

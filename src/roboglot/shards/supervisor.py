@@ -203,8 +203,7 @@ class Supervisor:
         pause = PAUSES[min(shard.deaths, len(PAUSES) - 1)]
         shard.deaths += 1
         if shard.hopeless:
-            if not any(other.reason == shard.reason and other is not shard for other in self.shards.values()):
-                log.error("shard %s cannot start: %s", shard.plan.name, shard.reason)
+            self.shards.refused(shard)
             self._turn_to(shard, State.FAILED)
             return
         shard.restarts += 1

@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from types import FrameType
+from typing import NoReturn
 
 PACKAGES = ("runtime", "simulation", "autonomy", "storage", "protocols", "programs", "console", "access", "transport")
 SELDOM = (  # modules that few shards need, or that are programs of their own
@@ -49,7 +50,7 @@ ENVIRONMENT = {  # of the nursery: keeps libraries from starting threads, and gR
 }
 TASKS = "/proc/self/task"
 PR_SET_PDEATHSIG = 1
-EXIT_BROKEN = 70  # of a child that could not begin
+EXIT_BROKEN = 70  # of a child that could not begin, or whose work failed
 
 
 class Threaded(RuntimeError):
@@ -138,6 +139,19 @@ def _begin(parent: int, prepare: Callable[[], None]) -> None:
     except BaseException:  # noqa: BLE001 - the caller's handlers are the parent's, which this process must not become
         sys.excepthook(*sys.exc_info())
         os._exit(EXIT_BROKEN)
+
+
+def become(work: Callable[[], int]) -> NoReturn:
+    """Do the work of a forked child, which has no caller to raise to, and end it with the work's status."""
+    status = EXIT_BROKEN
+    try:
+        status = work()
+    except BaseException:  # noqa: BLE001 - see above
+        sys.excepthook(*sys.exc_info())
+    finally:
+        with contextlib.suppress(OSError, ValueError):
+            sys.stderr.flush()
+        os._exit(status)
 
 
 def end_with(parent: int) -> None:
