@@ -145,7 +145,7 @@ def look_by_ray(claims: Claims, plan: FleetPlan, seconds: float) -> None:
             said_once = None if known else said[0]
             beat = Beat(1.0, 0, 0.0)
             return msgspec.json.encode(
-                Condition(1, "node", 7, 0, State.READY, 0.0, said_once, beat, "", hopeless=False, lines=[])
+                Condition(1, "node", 7, 0, State.READY, 0.0, said_once, beat, "", hopeless=False, lines=[], version="")
             )
 
         def stop(self) -> bytes:

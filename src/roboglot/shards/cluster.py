@@ -238,7 +238,11 @@ class ClusterFleet:
 
     def _cannot_read(self, shard: Shard, answer: bytes) -> None:
         """Handle the answer of an actor that another version of roboglot started; empty: it has no such method."""
-        reason = f"it {_version_in(answer)}; restart it: `roboglot fleet restart {shard.plan.name}`"
+        name, version = shard.plan.name, _version_in(answer)
+        if version in ("", own_version()):
+            reason = f"it runs another version of roboglot; restart it: `roboglot fleet restart {name}`"
+        else:
+            reason = f"it runs roboglot {version}, not {own_version()}; restart it: `roboglot fleet restart {name}`"
         if reason != shard.reason:
             log.warning("shard %s cannot be served: %s", shard.plan.name, reason)
         shard.reason, shard.ready, shard.beat = reason, None, Beat(0.0, 0, 0.0)
@@ -293,12 +297,10 @@ def _in_a_sentence() -> Iterator[None]:
 
 
 def _version_in(answer: bytes) -> str:
-    """Return which version sends this answer, which this one cannot read."""
+    """Return which version of roboglot sends an answer; empty if it does not say."""
     with suppress(msgspec.DecodeError):
-        version = msgspec.json.decode(answer, type=Version).version
-        if version not in ("", own_version()):
-            return f"runs roboglot {version}, not {own_version()}"
-    return "runs another version of roboglot"
+        return msgspec.json.decode(answer, type=Version).version
+    return ""
 
 
 def _cause(error: Exception) -> Exception:
