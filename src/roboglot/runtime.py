@@ -46,6 +46,7 @@ from roboglot.storage.programs import program_stores
 from roboglot.storage.registry_lease import RegistryLease, holder_of
 from roboglot.storage.robot_registry import RobotRegistry
 from roboglot.storage.transactions import Transactions
+from roboglot.transport.own_addresses import own_addresses
 from roboglot.transport.tls import Tls, server_context
 from roboglot.validation import host_and_port
 
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 RING_FOLDER = "recordings"  # in the data folder: the minutes before a fault
+EVERYWHERE = frozenset({"0.0.0.0", "::"})  # a program that listens there has each of this machine's addresses
 
 
 class Runtime:
@@ -223,8 +225,7 @@ class Runtime:
 
         pair = Path(settings.certificate), Path(settings.key)
         if not settings.certificate:
-            names = {robot.address for robot in self.config.robots} | {self.config.console.address}
-            pair = ensure_site(self.config.data / FOLDER, names | own_names())
+            pair = ensure_site(self.config.data / FOLDER, _names(self.config))
         try:
             context = server_context(*pair)
         except ssl.SSLError as error:
@@ -319,3 +320,11 @@ class Runtime:
         if self._recorder is not None:
             recorder, self._recorder = self._recorder, None
             await recorder.close()
+
+
+def _names(config: Config) -> set[str]:
+    """Return all addresses and host names by which clients reach the robots and the console."""
+    hosts = {host for part in (config.console, *config.doors.values()) for host in getattr(part, "hosts", ())}
+    names = {robot.address for robot in config.robots} | {config.console.address} | own_names()
+    names |= {host for host in hosts if host.isascii()}  # others are no names of certificates
+    return names | set(own_addresses()) if EVERYWHERE & names else names

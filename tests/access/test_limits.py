@@ -11,6 +11,7 @@ from pathlib import Path
 
 import httpx
 import pytest
+from cryptography import x509
 from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidHandshake
 
@@ -120,6 +121,20 @@ async def test_only_https_where_that_is_wanted(data: Path, token: str) -> None:
         with pytest.raises((InvalidHandshake, OSError, EOFError)):
             async with connect(f"ws://{ADDRESS}:50053/runs", additional_headers=bearer):
                 pass
+
+
+async def test_certificate_holds_for_each_way_in(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A program at 0.0.0.0 had a certificate for 0.0.0.0, which no client on another machine could verify."""
+    monkeypatch.setattr("roboglot.runtime.own_addresses", lambda: [ADDRESS, "10.88.0.1"])
+    base = load_config(None, {"data": str(data), "world": "empty", "lockstep": True})
+    console = ConsoleConfig(address="0.0.0.0", hosts=("robots.example",))
+    config = replace(base, console=console, access=AccessConfig(on=True, tls=TlsConfig(on=True)))
+    await Runtime(config).close()
+    certificate = x509.load_pem_x509_certificate((data / "cyberdog/site/site-cert.pem").read_bytes())
+    listed = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    addresses = {str(address) for address in listed.get_values_for_type(x509.IPAddress)}
+    assert {"127.0.0.1", "0.0.0.0", ADDRESS, "10.88.0.1"} <= addresses
+    assert {"localhost", "robots.example"} <= set(listed.get_values_for_type(x509.DNSName))
 
 
 def test_tls_is_configured_by_its_section(tmp_path: Path) -> None:

@@ -2,9 +2,10 @@
 
 import asyncio
 
-from roboglot.protocols.robomaster.datagrams import broadcast_address, own_addresses
+from roboglot.protocols.robomaster.datagrams import broadcast_address
 from roboglot.protocols.robomaster.ports import discovery
 from roboglot.testing.addresses import free_addresses
+from roboglot.transport.own_addresses import own_addresses
 from tests.protocols.robomaster.text_client import ADDRESS
 
 OTHER = free_addresses(1)

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import fcntl
 import logging
 import socket
-import struct
-from contextlib import suppress
 from ipaddress import IPv4Address
 
 log = logging.getLogger(__name__)
-
-SIOCGIFADDR = 0x8915  # Linux: asks for an interface's IPv4 address
-NAME_MAX = 15  # bytes of an interface's name
 
 
 class Datagrams:
@@ -43,14 +37,3 @@ class Datagrams:
 def broadcast_address(address: str) -> str:
     """Return the broadcast address of the network of ``address``."""
     return "127.255.255.255" if IPv4Address(address).is_loopback else "255.255.255.255"
-
-
-def own_addresses() -> list[str]:
-    """Return the IPv4 address of each network interface of this machine that has one."""
-    found = list[str]()
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
-        for _, name in socket.if_nameindex():
-            with suppress(OSError):  # it has none
-                answer = fcntl.ioctl(asking, SIOCGIFADDR, struct.pack("256s", name.encode()[:NAME_MAX]))
-                found.append(socket.inet_ntoa(answer[20:24]))
-    return found

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from ipaddress import IPv4Address
 
 from roboglot.protocols.robomaster.context import Context
-from roboglot.protocols.robomaster.datagrams import own_addresses
+from roboglot.transport.own_addresses import own_addresses
 
 PERIOD = 2.0  # s between two broadcasts
 
