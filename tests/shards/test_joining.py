@@ -10,6 +10,7 @@ import sys
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -20,7 +21,9 @@ os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 
 import ray
 
-from roboglot.shards.joining import NICENESS, join, own_token
+from roboglot.shards import ray_processes
+from roboglot.shards.joining import join, own_token
+from roboglot.shards.ray_processes import NICENESS
 from roboglot.testing.addresses import free_addresses
 
 # Ray's own threads leave sockets and files to the collector.
@@ -77,13 +80,35 @@ def test_shards_have_the_priority_of_their_command(monkeypatch: pytest.MonkeyPat
     """With Ray's own they stood still beside busy processes."""
     found: list[str | None] = []
     monkeypatch.setattr(ray, "init", lambda **_: found.append(os.environ.get(NICENESS)))
-    monkeypatch.setattr(os, "getpriority", lambda *_: 7)
     monkeypatch.setitem(os.environ, NICENESS, "")  # restored afterwards
     del os.environ[NICENESS]
     join("local")
     os.environ[NICENESS] = "3"  # the user's own
     join("local")
-    assert found == ["7", "3"]
+    assert found == ["0", "3"], "what Ray adds to the priority of its own processes, which is the command's"
+
+
+@pytest.mark.parametrize(("parent", "setting", "wanted"), [("raylet", None, 3), ("raylet", "15", 0), ("bash", None, 0)])
+def test_actor_keeps_the_priority_of_rays_node(
+    parent: str, setting: str | None, wanted: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ray lowers it while others keep the processor busy, and the nursery inherits it."""
+    found = dict[int, int]()
+    monkeypatch.setitem(os.environ, NICENESS, setting or "")  # restored afterwards
+    if setting is None:
+        del os.environ[NICENESS]
+    monkeypatch.setattr(ray_processes, "Path", lambda _: SimpleNamespace(read_text=lambda: f"{parent}\n"))
+    monkeypatch.setattr(os, "getpriority", lambda *_: 3)
+    monkeypatch.setattr(os, "setpriority", lambda _, thread, niceness: found.update({thread: niceness}))
+    ray_processes.keep_priority()
+    assert set(found.values()) == ({wanted} if wanted else set())
+    assert not found or os.getpid() in found, "of each thread, the first one's too"
+
+    def refuse(*_: object) -> None:
+        raise PermissionError
+
+    monkeypatch.setattr(os, "setpriority", refuse)
+    ray_processes.keep_priority()
 
 
 def test_silent_head_is_named_with_both_reasons(monkeypatch: pytest.MonkeyPatch, head: str) -> None:

@@ -21,6 +21,7 @@ import msgspec
 
 from roboglot.extras import own_version
 from roboglot.shards.messages import Beat, Ready
+from roboglot.shards.ray_processes import keep_priority
 from roboglot.shards.states import LOG_FILE, Shard, State
 
 AGAIN_SECONDS = 5.0  # s between two attempts to start a nursery, and until an actor that failed exits
@@ -123,6 +124,7 @@ class ShardActor:
     """
 
     def __init__(self, name: str, settings: dict[str, object], folder: str, *, of_node: bool) -> None:
+        keep_priority()
         import ray
 
         from roboglot.hosting.logs import in_shape, set_up_logging

@@ -14,10 +14,9 @@ from pathlib import Path
 
 from roboglot.extras import explaining
 from roboglot.hosting.error_text import in_words
-from roboglot.shards.ray_processes import children, end_children
+from roboglot.shards.ray_processes import NICENESS, children, end_children
 
 TOKENS = "RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"
-NICENESS = "RAY_worker_niceness"
 
 
 def own_token(environment: Mapping[str, str], home: Path) -> bool:
@@ -81,8 +80,8 @@ def _start_here() -> None:
 
     Raises Exception, as Ray does.
     """
-    # Ray's own 15 gives its processes hardly any time beside others: a killed shard was away for minutes.
-    os.environ.setdefault(NICENESS, str(os.getpriority(os.PRIO_PROCESS, 0)))
+    # Ray's own gives its processes hardly any time beside others: a killed shard was away for minutes.
+    os.environ.setdefault(NICENESS, "0")
     before = children()
     for start in range(1, STARTS_MAX + 1):
         try:
