@@ -13,6 +13,7 @@ from pathlib import Path
 import msgspec
 
 from roboglot.hosting.process import has_ended
+from roboglot.shards.memory import shortage
 from roboglot.shards.messages import MESSAGE_MAX, Beat, News, Ready, Refusal
 from roboglot.shards.nursery_client import NotWarm, NurseryClient, StartedNursery
 from roboglot.shards.plan import FleetPlan, save
@@ -76,6 +77,8 @@ class Supervisor:
         """Start all shards, in turn; return the nursery's warm-up time, s. Raises NotWarm, OSError."""
         if self._is_whole:
             save(self.plan, self.folder)
+            if why := shortage(self.plan):
+                log.warning(why)
         self._nursery.open()
         seconds = await self._nursery.warm()
         for shard in self.shards.values():
