@@ -115,6 +115,22 @@ async def test_go_there_poll_and_find_the_gravestone(
     assert (await client.get(f"{MOTION}/time")).json() == 0
 
 
+@pytest.mark.parametrize(("precision", "status"), [(0.8, (4, 0)), (0, (4, -1))])
+async def test_occupied_target_may_be_reached_nearly(
+    client: httpx.AsyncClient, world: World, forward: Forward, precision: float, status: tuple[int, int]
+) -> None:
+    """With ``precise``, which is for free targets, what a client accepts at an occupied one had no effect."""
+    origin = world.truth.pose_of("a")
+    world.stage.add_obstacle(origin.compose(Pose(2.0, 0.0)), (0.3, 0.3, 1.0))
+    await forward(seconds=1)
+    how = {"mode": 0, "flags": ["precise"], "acceptable_precision": precision}
+    info = await start(client, "MoveToAction", target={"x": 2.0, "y": 0.0}, move_options=how)
+    state = await finish(client, forward, info["action_id"], within=120.0)
+    assert (state["status"], state["result"]) == status
+    pose = map_pose(world, origin)
+    assert (math.hypot(pose.x - 2.0, pose.y) < 0.8) is (state["result"] == 0)
+
+
 async def test_through_several_points(client: httpx.AsyncClient, world: World, forward: Forward) -> None:
     origin = world.truth.pose_of("a")
     await forward(seconds=1)

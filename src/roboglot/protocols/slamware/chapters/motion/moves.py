@@ -68,9 +68,9 @@ def navigation_options(robot: Robot, how: MoveOptions, yaw: float | None) -> Nav
 
 def tolerance_of(how: MoveOptions) -> float | None:
     """Return the distance (m) from the target that counts as arrived; None if the client leaves it open."""
-    if how.has("precise"):
-        return PRECISE
-    return min(max(how.acceptable_precision, PRECISE), OCCUPIED_MAX) if how.acceptable_precision else None
+    if how.acceptable_precision:  # it says nothing of how precisely a free target is reached, so ``precise`` may stand
+        return min(max(how.acceptable_precision, PRECISE), OCCUPIED_MAX)
+    return PRECISE if how.has("precise") else None
 
 
 def has_tracks(robot: Robot) -> bool:
