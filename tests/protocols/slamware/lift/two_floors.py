@@ -32,15 +32,24 @@ def on_map(point: Point, origin: Pose) -> Point:
 
 
 def area_of(origin: Pose, doors: str = "0") -> dict[str, Any]:
+    start, end = ends_of(origin, doors)
+    ends = {"start": {"x": start.x, "y": start.y}, "end": {"x": end.x, "y": end.y}}
+    return {"area": {**ends, "half_width": 0.8}, "metadata": metadata_of(doors)}
+
+
+def ends_of(origin: Pose, doors: str) -> tuple[Point, Point]:
+    """Return the ends of the car's area on the map; its only door is where the rear one is if that is all it has."""
     start, end = on_map(FRONT, origin), on_map(BACK, origin)
-    metadata = {
+    return (end, start) if doors == "1" else (start, end)
+
+
+def metadata_of(doors: str) -> dict[str, str]:
+    return {
         "elevator_id": LIFT,
         "elevator_sill_width": "0.3",
         "elevator_scheduling_point_dist": "0.9",
         "elevator_door_type": doors,
     }
-    ends = {"start": {"x": start.x, "y": start.y}, "end": {"x": end.x, "y": end.y}}
-    return {"area": {**ends, "half_width": 0.8}, "metadata": metadata}
 
 
 async def start(client: httpx.AsyncClient, name: str, **options: object) -> int:
@@ -72,11 +81,10 @@ async def drive_to(client: httpx.AsyncClient, forward: Forward, origin: Pose, *x
         assert (await finish(client, forward, id))[0] == SUCCESS
 
 
-async def two_floors(robot: Robot, client: httpx.AsyncClient, origin: Pose) -> None:
+async def two_floors(robot: Robot, client: httpx.AsyncClient, origin: Pose, doors: str = "0") -> None:
     """A map of two floors of the same building, the upper one known as far as the lower one is."""
-    start, end = on_map(FRONT, origin), on_map(BACK, origin)
-    metadata = {"elevator_id": LIFT, "elevator_sill_width": "0.3", "elevator_scheduling_point_dist": "0.9"}
-    drawn = Annotations().with_new(Area(0, AreaKind.ELEVATOR, start, end, 0.8, metadata=metadata))
+    start, end = ends_of(origin, doors)
+    drawn = Annotations().with_new(Area(0, AreaKind.ELEVATOR, start, end, 0.8, metadata=metadata_of(doors)))
     grid = robot[Mapping].grid
     up = on_map(Point(6.0, 10.0), origin)
     rooms = (PointOfInterest("u1", Pose(up.x, up.y), {"display_name": "upstairs"}),)
@@ -92,11 +100,13 @@ async def two_floors(robot: Robot, client: httpx.AsyncClient, origin: Pose) -> N
     assert (await client.post(f"{MULTI}/stcm/:reload", json={"pose": pose})).status_code == 200
 
 
-async def map_two_floors(robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward) -> Pose:
+async def map_two_floors(
+    robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, doors: str = "0"
+) -> Pose:
     """Map the way to the lift, and load that as both floors; return the map's origin in the world."""
     origin = world.truth.pose_of("a")
     world.stage.person("person 0 0").place(28.5, 10.5)  # out of the way
     await forward(seconds=1)
     await drive_to(client, forward, origin, 10.0, 5.0)
-    await two_floors(robot, client, origin)
+    await two_floors(robot, client, origin, doors)
     return origin

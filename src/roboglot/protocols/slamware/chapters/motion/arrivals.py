@@ -62,7 +62,7 @@ class Arrivals:
         with contextlib.suppress(RobotError):  # the lift is out of reach, or does not stop here
             state = robot[LiftClient].state
             if car and state.target is None and state.floor != stop_at(self._context, self._context.maps.current):
-                place = robot[Localization].pose.relative_to(car.inside)
+                place = robot[Localization].pose.relative_to(car.aboard)
                 self._reached(FloorReached(stamp=robot.clock.time(), floor=state.floor, place=place))
 
     def _declare(self) -> None:
@@ -87,10 +87,10 @@ class Arrivals:
                 await maps.leave_floors(stop, self._car_alone(event.place))
                 raise NotFound(f"no loaded floor has a map of the lift's stop {stop}")
             landing = shared[0][1] if shared else None
-            pose = landing.inside.compose(event.place) if landing and event.place else None
+            pose = landing.aboard.compose(event.place) if landing and event.place else None
             await maps.enter(floor.name.building, floor.name.floor, pose)
             if landing is not None:
-                robot[Floors].set_lift(landing.waiting(), landing.inside)
+                robot[Floors].set_lift(landing.entrance, landing.aboard)
         except RobotError as error:
             log.warning("robot %s was brought to a floor whose map it cannot use: %s", robot.id, error)
 
@@ -101,4 +101,4 @@ class Arrivals:
             return Drawings((), Annotations(last_id=now.last_id))
         (elevator,) = elevators
         drawn = Drawings((), Annotations(areas=(elevator.area,), last_id=now.last_id))
-        return seen_from(elevator.inside.compose(place), drawn)
+        return seen_from(elevator.aboard.compose(place), drawn)

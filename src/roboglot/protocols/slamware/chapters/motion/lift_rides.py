@@ -133,13 +133,13 @@ async def change_floor(context: Context, errand: Errand, floor: FloorMap | None)
         lift, landing = shared[0]
     floors, goal = robot[Floors], stop_at(context, name)
     floors.begin_on(stop_at(context, maps.current))
-    floors.set_lift(lift.waiting(), lift.inside)
+    floors.set_lift(lift.entrance, lift.aboard)
     await errand.do(floors.ride(goal, redraw=False, source=PART))  # on arrival the floor is entered, drawings and all
     if name != maps.current:
-        await maps.enter(name.building, name.floor, landing.waiting())
+        await maps.enter(name.building, name.floor, landing.entrance)
     elif robot[Localization].lost is not None:
         async with confirmed():
-            robot[Localization].set_pose(landing.waiting())
+            robot[Localization].set_pose(landing.entrance)
 
 
 def car_to_leave(context: Context) -> Elevator | None:

@@ -71,6 +71,12 @@ class Elevator:
         a, b = self.area.start, self.area.end
         return Pose((a.x + b.x) / 2, (a.y + b.y) / 2, self.inward)
 
+    @property
+    def aboard(self) -> Pose:
+        """Pose in the middle of the car after a ride's way in: facing away from the front door, or the only one."""
+        middle = self.inside
+        return middle.compose(Pose(yaw=math.pi)) if self.doors is DoorType.REAR else middle
+
     def deep(self, radius: float, *, rear: bool) -> Point:
         """Return the innermost place for a hull of ``radius`` (m) that came in by a door: at least the middle."""
         depth = max(0.0, self.area.start.distance_to(self.area.end) / 2 - radius - WALL_GAP)
@@ -80,6 +86,11 @@ class Elevator:
         """Return the pose in front of a door, facing it."""
         door, yaw = (self.area.end, self.inward + math.pi) if rear else (self.area.start, self.inward)
         return Pose(door.x, door.y, wrap_angle(yaw)).compose(Pose(-self.sill - self.distance))
+
+    @property
+    def entrance(self) -> Pose:
+        """Pose in front of the door that rides use, facing it: the front one, or the rear one if that is all it has."""
+        return self.waiting(rear=self.doors is DoorType.REAR)
 
     def relation(self, here: Pose, radius: float) -> PoseRelation:
         """Return the place of the robot's middle; over the sill if its hull (``radius``, m) reaches across."""
