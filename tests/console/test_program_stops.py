@@ -59,10 +59,9 @@ async def test_teacher_ends_programs_that_move_robots(taught: ServedConsole, do:
     assert (await stopped(taught, "/api/class", {"do": do}))[0] == 200
     await stands(taught, TAUGHT)
     if do == "lock":
-        await taught.ask("/api/robots/a/program", {"source": "print(cyberdog.motion.turn(90, 3))\n"})
-        await taught.clock.advance(5.0)
-        assert abs(taught.robot[Base].velocity.yaw) < 0.01
-        log = (await taught.ask("/api/robots/a/program"))[1]["log"]
-        assert any("the teacher has locked robot a" in line["text"] for line in log)
+        refusal = await taught.ask("/api/robots/a/program", {"source": ROUND})
+        assert refusal == (409, {"error": "the teacher has locked robot a"})
         assert (await stopped(taught, "/api/class", {"do": "unlock"}))[0] == 200
+        await taught.clock.advance(5.0)
+        assert not taught.robot.actions.running()
     await turns_round(taught)

@@ -182,7 +182,7 @@ class Desk:
             if robot.starts.down and verb not in HOLD:
                 raise Refused(robot.starts.down)
             programs = self.studio.programs.get(name) if verb == STOP and not values else None
-            if programs is None or not programs.service.running():
+            if programs is None:
                 return await operation.call(robot, values)
             ending = programs.end_all(why="ended by Stop")
             ends = await asyncio.gather(operation.call(robot, values), ending, return_exceptions=True)

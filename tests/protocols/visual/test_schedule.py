@@ -8,7 +8,13 @@ from typing import Any
 
 import pytest
 
+from roboglot.model.client_context import acting_for
 from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.emergency_stop import EmergencyStop
+from roboglot.model.components.system import stopping
+from roboglot.model.components.system.lease import PERSON, TEACHER, Lease
+from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import BatteryState
 from roboglot.programs.stores import StoredProgram
@@ -19,6 +25,9 @@ from tests.protocols.visual.front_end import FrontEnd
 Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
 HELLO = "print('hello', time.strftime('%H:%M'))"
 FOREVER = "time.sleep(1e6)"
+MOVES = "print(cyberdog.motion.go_straight(0.3, 0.5).response.result)"
+LOCKED = "the teacher has locked robot a"
+STOPPED = "since it was stopped at the console, the robot waits for a command"
 
 
 async def plan(app: FrontEnd, id: str, mode: str, condition: str, body: str = HELLO) -> None:
@@ -185,3 +194,84 @@ class Charge(Battery):
     @property
     def state(self) -> BatteryState:
         return BatteryState(self.charge, 24.0, -1.0, 25.0, False, 1)
+
+
+async def test_locked_robot_starts_no_program(connect: Connect, robot: Robot) -> None:
+    app = await connect(robot)
+    await app.start("held", "time.sleep(1e6)")
+    await app.ask("suspend", "held")
+    assert (await app.save("t", MOVES))["state"] == 0
+    await robot[Lease].take(TEACHER)
+    frame = {"mode": "single", "condition": "now", "body": MOVES}
+    for [answer] in (
+        await app.ask("run", "t"),
+        await app.ask("debug", "debug", **frame),
+        await app.ask("recover", "held"),
+    ):
+        assert (answer["state"], answer["describe"]) == (27, LOCKED)
+    assert (await app.state("t"), await app.state("held")) == ("wait_run", "suspend")
+    assert (await app.ask("shutdown", "held"))[0]["state"] == 0
+    await robot[Lease].release()
+    await app.clock.advance(10.0)
+    assert not app.news("t", "start")
+    await app.start("t", MOVES)
+    await app.ends("t", pace=0.2)
+    assert await app.printed("t") == ["True"]
+
+
+async def test_control_of_others_starts_programs(connect: Connect, robot: Robot) -> None:
+    app = await connect(robot)
+    await robot[Lease].take(PERSON)
+    await app.start("t", "print('hello')")
+    await app.ends("t")
+    assert await app.printed("t") == ["hello"]
+
+
+@pytest.mark.parametrize(("mode", "condition"), [("single", "now + 1minutes"), ("cycle", "* * * * *")])
+@pytest.mark.parametrize("why", [LOCKED, STOPPED, "the emergency stop holds the robot"])
+async def test_schedule_skips_robots_that_are_held(
+    connect: Connect, robot: Robot, mode: str, condition: str, why: str
+) -> None:
+    app = await connect(robot)
+    await plan(app, "t", mode, condition, MOVES)
+    match why:
+        case _ if why == LOCKED:
+            await robot[Lease].take(TEACHER)
+        case _ if why == STOPPED:
+            await stopping.stop(robot, reason="stopped at the console", moving=True)
+        case _:
+            robot[EmergencyStop].engage()
+    await app.clock.advance(60.0)
+    await app.until(lambda: app.news("t", "start"), pace=0.0)
+    [report] = app.news("t", "start")
+    assert (report["feedback"]["state"], report["feedback"]["describe"]) == (27, why)
+    assert await app.state("t") == ("run_wait" if mode == "cycle" else "shutdown")
+    assert [entry.text for entry in await app.service.log("t")] == [f"not started at its time: {why}"]
+    await robot[Lease].release()
+    robot[EmergencyStop].release()
+    await app.clock.advance(30.0)
+    assert not robot.actions.running()
+    if mode == "cycle":
+        await app.clock.advance(30.0)
+        await app.ends("t", pace=0.2)
+        assert await app.printed("t") == ["True"]
+
+
+@pytest.mark.parametrize("command", ["drive", "run", "debug"])
+async def test_schedule_goes_on_after_a_command(connect: Connect, robot: Robot, command: str) -> None:
+    app = await connect(robot)
+    await plan(app, "t", "cycle", "* * * * *", MOVES)
+    await stopping.stop(robot, reason="stopped at the console", moving=True)
+    robot[Driving].drive(Twist(), lifetime=0.1, source="pad")  # the robot itself, and no motion
+    assert robot[Lease].stopped
+    match command:
+        case "drive":
+            with acting_for("robomaster 10.0.0.5"):
+                robot[Driving].drive(Twist(x=0.1), lifetime=0.2, source="pad")
+        case "run":
+            await app.start("other", "print('hello')")
+        case _:
+            await app.ask("debug", "debug", mode="single", condition="now", body="print('hello')")
+    await app.clock.advance(60.0)
+    await app.ends("t", pace=0.2)
+    assert await app.printed("t") == ["True"]

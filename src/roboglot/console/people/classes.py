@@ -253,11 +253,13 @@ class Classes:
         if do == "lock" and name not in locked:
             locked.add(name)
             try:
-                await self._stop(name)
                 with robot.inputs.noting(LEASE, "give", {"who": TEACHER}):
                     await robot[Lease].take(TEACHER)
+                await self._stop(name)  # after the lock, so that no program begins in between
             except BaseException:
                 locked.discard(name)  # it moves for its pupil as before
+                with contextlib.suppress(RobotError):
+                    await _release(robot)
                 raise
         elif do in ("unlock", "close") and name in locked:
             locked.discard(name)

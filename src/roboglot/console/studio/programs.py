@@ -28,9 +28,10 @@ class Programs:
     service: ProgramService
 
     async def end_all(self, why: str) -> None:
-        """End every program that runs or is held; ``why`` is the last line of their logs."""
-        running = [figures.target_id for figures in self.service.running()]
-        await self.service.shutdown(running, why=why)
+        """End every program that runs, is held or is just being started; ``why`` is the last line of their logs."""
+        for _ in range(2):  # the first waits for a start that is under way
+            running = [figures.target_id for figures in self.service.running()]
+            await self.service.shutdown(running, why=why)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from roboglot.console.verbs.robots import VERBS, Name
 from roboglot.model.action import ActionStatus
 from roboglot.model.components.logistics.delivery import Delivery, Order, OrderKind, OrderStage, OrderStatus
+from roboglot.model.components.system.lease import Lease
 from roboglot.model.robot import Robot
 
 OPEN_MAX, ENDED_MAX = 20, 5  # shown
@@ -20,8 +21,10 @@ STATUSES = {  # pages know the words of actions
 
 @VERBS.on("resume_orders", needs=(Delivery,))
 async def resume_orders(robot: Robot) -> None:
-    """Go on with the orders after a stop."""
+    """Go on with the orders, and with scheduled programs, after a stop."""
     await robot[Delivery].execute(True)
+    if Lease in robot:
+        robot[Lease].stopped = ""
 
 
 @VERBS.on("cancel_order", needs=(Delivery,))

@@ -10,8 +10,10 @@ from enum import StrEnum
 
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.energy.power import Power, PowerMode
+from roboglot.model.components.motion.emergency_stop import is_stopped
 from roboglot.model.components.system.disk import Disk
 from roboglot.model.components.system.firmware import Firmware, FirmwareState
+from roboglot.model.components.system.lease import Lease
 from roboglot.model.robot import Robot
 from roboglot.programs.errors import LimitReached, NotAllowed
 from roboglot.programs.tasks.states import TaskOperation
@@ -40,6 +42,7 @@ _LOOK_AND_END = frozenset(
     {TaskOperation.INQUIRY, TaskOperation.SUSPEND, TaskOperation.SHUTDOWN, TaskOperation.STOP},
 )
 _ASLEEP = _LOOK_AND_END | {TaskOperation.SAVE, TaskOperation.DELETE}
+_BEGINNINGS = frozenset({TaskOperation.DEBUG, TaskOperation.RUN, TaskOperation.RECOVER, TaskOperation.START})
 
 ALLOWED: dict[RobotMode, frozenset[TaskOperation]] = {
     RobotMode.UNINITIALIZED: frozenset(),
@@ -74,11 +77,28 @@ def mode_of(robot: Robot) -> RobotMode:
 
 
 def check_mode(robot: Robot, operation: TaskOperation) -> None:
-    """Raise ProgramError if the robot's mode (0.2.2.3) or a full disk forbids ``operation``."""
+    """Raise ProgramError if the robot's mode (0.2.2.3), a teacher's lock or a full disk forbids ``operation``."""
     mode = mode_of(robot)
     if operation not in ALLOWED[mode]:
         raise NotAllowed(
             f"The current robot is in [{mode}] mode and does not support <{operation}> operation.",
         )
+    if operation in _BEGINNINGS and Lease in robot and (locked := robot[Lease].locked):
+        raise NotAllowed(locked)  # it would move once it is unlocked
     if operation is TaskOperation.SAVE and Disk in robot and robot[Disk].free <= 0:
         raise LimitReached("the disk is full")
+
+
+def check_scheduled(robot: Robot) -> None:
+    """Raise NotAllowed if no task may begin by its schedule: as for START, and after a person stopped the robot."""
+    check_mode(robot, TaskOperation.START)
+    if is_stopped(robot):
+        raise NotAllowed("the emergency stop holds the robot")
+    if Lease in robot and (stopped := robot[Lease].stopped):
+        raise NotAllowed(f"since it was {stopped}, the robot waits for a command")
+
+
+def end_wait(robot: Robot) -> None:
+    """Let scheduled tasks begin again: a client has started a program after a person stopped the robot."""
+    if Lease in robot:
+        robot[Lease].stopped = ""

@@ -21,6 +21,7 @@ from roboglot.programs.functions import ability_set
 from roboglot.programs.library.library import ModuleLibrary
 from roboglot.programs.stores import LogEntry, StoredProgram, Stores
 from roboglot.programs.tasks.reports import Insight, Listeners, NewestRun, Pace, TaskReport, done
+from roboglot.programs.tasks.robot_modes import end_wait
 from roboglot.programs.tasks.states import DEBUG, TaskOperation, TaskState, state_after
 from roboglot.programs.tasks.task_run import Outcome, RunListeners, TaskRun, in_units
 from roboglot.values import dataclass
@@ -221,6 +222,7 @@ class Runner:
 
     async def recover(self, run: TaskRun, step: Callable[[], None] | None = None) -> None:
         """Continue a run and report it; ``step`` sets the next halt."""
+        end_wait(self._robot)
         run.state = TaskState.RUN
         if step:
             step()

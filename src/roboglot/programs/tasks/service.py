@@ -26,7 +26,7 @@ from roboglot.programs.tasks.deferred_stops import DeferredStops
 from roboglot.programs.tasks.owners import act_for_owner
 from roboglot.programs.tasks.recovery import settle
 from roboglot.programs.tasks.reports import RunFigures, TaskPosition, TaskReport, done
-from roboglot.programs.tasks.robot_modes import check_mode
+from roboglot.programs.tasks.robot_modes import check_mode, check_scheduled, end_wait
 from roboglot.programs.tasks.runner import Background, Runner, RunSettings
 from roboglot.programs.tasks.states import DEBUG, TaskOperation, TaskState, next_state, state_after
 from roboglot.programs.tasks.task_run import TaskRun
@@ -162,6 +162,7 @@ class ProgramService:
                 uses=(),  # a debug run must not prevent deleting a module
             )
             refuse_wrong(problems)
+            end_wait(self.robot)
             await self._runner.start(kept, uses)
 
     async def run(self, id: str, mode: str = "", condition: str = "") -> None:
@@ -186,6 +187,7 @@ class ProgramService:
                 await self._runner.check_startable(uses)
             task = replace(task, state=TaskState.RUN_WAIT, due=due)
             await self._store.put(task)
+            end_wait(self.robot)
             if now:
                 await self._runner.start(task, uses)
             elif due is not None:
@@ -337,7 +339,7 @@ class ProgramService:
             if task.state != TaskState.RUN_WAIT:
                 return
             try:
-                check_mode(self.robot, TaskOperation.START)
+                check_scheduled(self.robot)
                 act_for_owner(self.robot, task)
                 uses = await self._store.uses(id)
                 await self._runner.check_startable(uses)

@@ -60,6 +60,7 @@ class Lease(Component):
         self._robot, self._clock = robot, robot.clock
         self._taken_by = str(robot[Settings].get(KEPT, "")) if Settings in robot else ""
         self._last = Holder("", "", self._clock.time())
+        self.stopped = ""  # why a person stopped it, until a client moves it, starts a program, or control is released
         self._outside_since: float | None = None
         self._fence: Callable[[], str] = str  # no fence: every client may drive
         self._logged_at = -math.inf
@@ -140,6 +141,7 @@ class Lease(Component):
 
     async def release(self) -> None:
         """Release control, so that every client may move the robot; return once that is stored."""
+        self.stopped = ""
         if self._taken_by:
             log.warning("robot %s: %s released control", self._robot.id, self._taken_by)
             self._taken_by = ""
@@ -151,11 +153,14 @@ class Lease(Component):
             await self._robot[Settings].put(KEPT, self._taken_by)
 
     @property
+    def locked(self) -> str:
+        """Reason why no program may start while a teacher has locked the robot; empty: programs may."""
+        return f"the teacher has locked robot {self._robot.id}" if self._taken_by == TEACHER else ""
+
+    @property
     def _taken(self) -> str:
         words = f"control is taken by {self._taken_by}"
-        if self._taken_by == TEACHER:
-            words = f"the teacher has locked robot {self._robot.id}"
-        return words
+        return self.locked or words
 
     def _admit(self, action: Action) -> None:
         """Raise Busy for an action that may not start. Stopping is allowed unless others move a real robot."""
@@ -168,6 +173,8 @@ class Lease(Component):
         elif not self.may_move(action.client) and not _stops(action.goal):
             why = self._taken
         else:
+            if action.client and not _stops(action.goal):
+                self.stopped = ""
             return
         self._publish_refused(action, why)
         raise Busy(why)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from roboglot.model.components.logistics.delivery import Delivery
-from roboglot.model.components.system.lease import moves
+from roboglot.model.components.system.lease import Lease, moves
 from roboglot.model.errors import Refused, RobotError
 from roboglot.model.robot import Robot
 
@@ -11,9 +11,11 @@ from roboglot.model.robot import Robot
 async def stop(robot: Robot, *, reason: str, moving: bool = False) -> None:
     """Cancel all actions, or only those ``moving`` the robot, and hold its orders; return when it stands.
 
-    The next order, or the drive home, would otherwise begin at once. Raises Refused if the hold cannot be stored, and
-    then lasts until a restart.
+    The next order, the drive home, or a scheduled program would otherwise begin at once. Raises Refused if the hold of
+    orders cannot be stored, and then lasts until a restart.
     """
+    if Lease in robot:
+        robot[Lease].stopped = reason
     held = Delivery in robot and robot[Delivery].halt()
     if moving:
         doomed = [action for action in robot.actions.running() if moves(action)]
