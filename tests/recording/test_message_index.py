@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import io
 import struct
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
+from typer.testing import CliRunner
 
-from roboglot.recording.message_index import MessageIndex, TimedMessage
-from roboglot.recording.reader import BadRecording
+from roboglot.cli.recordings.record import app
+from roboglot.recording.entries import NANO, Entry
+from roboglot.recording.files import Attachment, Files, Limits, Origin
+from roboglot.recording.message_index import MessageIndex, TimedMessage, read_outline
+from roboglot.recording.reader import BadRecording, Recording, read_recording, summary_of
+from roboglot.recording.redaction import Redaction
 
 MESSAGES = st.lists(st.tuples(st.integers(0, 2), st.integers(1, 60)), min_size=1, max_size=40)
 FLUSHED = st.sets(st.integers(0, 40))  # messages before which a chunk ends
@@ -91,3 +98,59 @@ def test_damaged_chunk_is_no_end_of_program(tmp_path: Path) -> None:
     (tmp_path / "no.mcap").write_bytes(b"no recording")
     with pytest.raises(BadRecording):
         MessageIndex(tmp_path / "no.mcap")
+
+
+TICKS = st.lists(st.tuples(st.integers(0, 2), st.integers(0, 3)), min_size=1, max_size=20)  # topic, s since the last
+
+
+def record(folder: Path, ticks: Sequence[tuple[int, int]], part_seconds: float) -> list[Path]:
+    """Write a recording in parts; the battery's level is repeated in each."""
+    origin = Origin({"version": "1", "world": "w"}, [Attachment("world.toml", "text/plain", b"x = 1")])
+    files = Files(folder / "r.mcap", origin, Redaction(), Limits(part_seconds=part_seconds))
+    files.open(NANO)
+    at = NANO
+    for topic, seconds in ticks:
+        at += seconds * NANO
+        name = ("/a/events", "/b/events", "/a/body")[topic]
+        kind = "state" if topic == 2 else "event"
+        files.write(Entry(name, kind, at, at, {"event": "Tick"}))
+        files.flush()
+    files.close()
+    return sorted(folder.glob("*.mcap"))
+
+
+def outline_of(recording: Recording) -> tuple[object, ...]:
+    files = {name: bytes(data) for name, data in recording.attachments.items()}
+    return recording.facts, files, recording.topics, recording.first, recording.last, recording.whole
+
+
+@settings(max_examples=60, deadline=None)
+@given(TICKS, st.sampled_from([1.0, 4.0, 100.0]), st.integers(0, 400), st.integers(0, 5))
+def test_outline_says_what_all_messages_say(
+    ticks: Sequence[tuple[int, int]], part_seconds: float, cut: int, which: int
+) -> None:
+    with TemporaryDirectory() as folder:
+        paths = record(Path(folder), ticks, part_seconds)
+        shortened = paths[which % len(paths)]
+        shortened.write_bytes(shortened.read_bytes()[: -cut or None])
+        for path in paths:
+            assert outline_of(read_outline(path)) == outline_of(read_recording(path))
+
+
+def test_outline_leaves_chunks_unread(tmp_path: Path) -> None:
+    (path,) = record(tmp_path, [(0, 1), (1, 1), (0, 1)], 100.0)
+    expected = outline_of(read_recording(path))
+    summary = summary_of(io.BytesIO(path.read_bytes()))
+    assert summary
+    row = summary.chunk_indexes[1]
+    whole = path.read_bytes()
+    end = row.chunk_start_offset + row.chunk_length
+    path.write_bytes(whole[: end - 8] + bytes(8) + whole[end:])
+    assert outline_of(read_outline(path)) == expected
+    assert read_recording(path).topics == {"/a/events": 2}
+    for options, counts in ([], {"2 /a/events", "1 /b/events"}), (["--check"], {"2 /a/events"}):
+        said = CliRunner().invoke(app, ["info", *options, str(path)]).stdout
+        assert {line.strip() for line in said.splitlines() if "/events" in line} == counts
+        assert ("incomplete" in said) is bool(options)
+    path.write_bytes(whole[: row.chunk_start_offset] + bytes(40) + whole[row.chunk_start_offset + 40 :])
+    assert outline_of(read_outline(path)) == outline_of(read_recording(path))  # the index does not fit the file

@@ -1,4 +1,4 @@
-"""Finds messages of a recording by their time, reading only the necessary chunks.
+"""Finds messages of a recording by their time, reading only the necessary chunks, and counts them.
 
 A whole file has an index; one that was cut off is read once, from the front.
 """
@@ -6,25 +6,40 @@ A whole file has an index; one that was cut off is read once, from the front.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import accumulate
 from pathlib import Path
+from struct import Struct
 from typing import IO, NamedTuple
 
 from mcap.data_stream import ReadDataStream
-from mcap.records import Channel, Chunk, Message, Schema
+from mcap.opcode import Opcode
+from mcap.records import AttachmentIndex, Channel, Chunk, McapRecord, Message, MetadataIndex, Schema
+from mcap.stream_reader import StreamReader
 from mcap.summary import Summary
 
-from roboglot.recording.reader import BadRecording, parts, stream, summary_of, unpacked
+from roboglot.recording.latched_values import REPEATED
+from roboglot.recording.reader import (
+    BadRecording,
+    Recording,
+    note_head,
+    parts,
+    read_part,
+    stream,
+    summary_of,
+    unpacked,
+)
 from roboglot.text_files import open_bytes
 from roboglot.values import dataclass
-from roboglot.wire.mcap_damage import DAMAGE
+from roboglot.wire.mcap_damage import DAMAGE, RECORD_MAX
 
+RECORD_HEAD = 9  # bytes: opcode and length
+_chunk_start = Struct("<BQQQQ")  # of a chunk's record: head, times of its first and last message, unpacked size
 TOPICS_MAX = 4096
 WAITING_MAX = 1 << 30  # bytes of messages read ahead, because their chunks overlap
 MESSAGE_BYTES = 150  # of a message, beside its data
-RECORD_HEAD = 9  # bytes: opcode and length
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,3 +223,83 @@ def _bytes_of(messages: Sequence[TimedMessage]) -> int:
 def _before(messages: Sequence[TimedMessage], until: int) -> int:
     """Return the number of ``messages``, which are in order, before ``until`` (ns since 1970)."""
     return bisect_right(messages, until - 1, key=_time)
+
+
+def read_outline(path: Path) -> Recording:
+    """Return what ``read_recording`` does, without exchanges and inputs, from the index of each file that has one.
+
+    Damage within chunks stays unnoticed there. Raises BadRecording, OSError.
+    """
+    recording = Recording(path)
+    for part in parts(path):
+        if not _outline_part(part, recording, first=part == path):
+            read_part(part, recording, first=part == path)
+    if "version" not in recording.facts:
+        raise BadRecording(f"{path} is not a recording of roboglot")
+    recording.exchanges, recording.inputs = [], []
+    return recording
+
+
+def _outline_part(path: Path, recording: Recording, *, first: bool) -> bool:
+    """Add what the index of a file says; return False, adding nothing, if it has none that fits its chunks."""
+    with open_bytes(path) as file:
+        summary = summary_of(file)
+        figures = None if summary is None else summary.statistics
+        try:
+            if summary is None or figures is None or not _fits(file, summary):
+                return False
+            counts = Counter(figures.channel_message_counts)
+            if not first:
+                counts.subtract(_repeated(path, file, summary))
+            heads = _records_at(file, [*summary.metadata_indexes, *summary.attachment_indexes])
+        except (BadRecording, *DAMAGE):
+            return False
+    for record in heads:
+        note_head(recording, record)
+    for number, count in counts.items():
+        channel = summary.channels.get(number)
+        if count > 0 and channel is not None and channel.schema_id in summary.schemas:
+            recording.topics[channel.topic] = recording.topics.get(channel.topic, 0) + count
+    if counts.total() > 0:
+        recording.first = min(recording.first or figures.message_start_time, figures.message_start_time)
+        recording.last = max(recording.last, figures.message_end_time)
+    recording.whole = True
+    return True
+
+
+def _fits(file: IO[bytes], summary: Summary) -> bool:
+    """Return whether an index is complete and in step with the chunks of the file."""
+    figures = summary.statistics
+    assert figures is not None
+    counted = figures.chunk_count, figures.attachment_count, figures.metadata_count, figures.message_count
+    listed = [len(rows) for rows in (summary.chunk_indexes, summary.attachment_indexes, summary.metadata_indexes)]
+    if counted != (*listed, sum(figures.channel_message_counts.values())):
+        return False
+    for row in summary.chunk_indexes:
+        file.seek(row.chunk_start_offset)
+        times = row.message_start_time, row.message_end_time, row.uncompressed_size
+        if _chunk_start.unpack(file.read(_chunk_start.size)) != (Opcode.CHUNK, row.chunk_length - RECORD_HEAD, *times):
+            return False
+    return True
+
+
+def _repeated(path: Path, file: IO[bytes], summary: Summary) -> Counter[int]:
+    """Count the messages at the beginning of a part, by channel, that an earlier part has, too."""
+    found = Counter[int]()
+    for row in sorted(summary.chunk_indexes, key=lambda row: row.chunk_start_offset):
+        file.seek(row.chunk_start_offset + RECORD_HEAD)
+        messages = [one for one in unpacked(path, Chunk.read(ReadDataStream(file))) if isinstance(one, Message)]
+        again = [one.channel_id for one in messages if one.sequence == REPEATED]
+        found.update(again)
+        if len(again) < len(messages):
+            break
+    return found
+
+
+def _records_at(file: IO[bytes], rows: Sequence[MetadataIndex | AttachmentIndex]) -> list[McapRecord]:
+    """Return the metadata and attachments at these places. Raises errors of ``mcap_damage``."""
+    found = []
+    for row in rows:
+        file.seek(row.offset)
+        found.append(next(StreamReader(file, skip_magic=True, record_size_limit=RECORD_MAX).records))
+    return found

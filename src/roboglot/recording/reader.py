@@ -236,7 +236,7 @@ def read_recording(path: Path) -> Recording:
     """Read the file at ``path`` and the parts that follow it. Raises BadRecording, OSError."""
     recording = Recording(path)
     for part in parts(path):
-        _read_part(part, recording, first=part == path)
+        read_part(part, recording, first=part == path)
     if "version" not in recording.facts:
         raise BadRecording(f"{path} is not a recording of roboglot")
     return recording
@@ -259,7 +259,8 @@ def _part_of(path: Path) -> str:
     return str(next((record.metadata.get("part", "") for record in found), ""))
 
 
-def _read_part(path: Path, recording: Recording, *, first: bool) -> None:
+def read_part(path: Path, recording: Recording, *, first: bool) -> None:
+    """Add what a file has; the ``first`` of a recording also has what others repeat. Raises BadRecording, OSError."""
     try:
         _read_records(path, recording, first=first)
     except BadRecording:
@@ -274,15 +275,22 @@ def _read_records(path: Path, recording: Recording, *, first: bool) -> None:
         match record:
             case Message(sequence=0) if not first:
                 pass  # an earlier part has it
-            case Metadata(name="roboglot"):
-                facts = {key: value for key, value in record.metadata.items() if key != "part"}
-                recording.facts = facts | recording.facts  # those of the first part, as when it was begun
-            case Attachment():
-                recording.attachments[record.name] = record.data
+            case Metadata() | Attachment():
+                note_head(recording, record)
             case Message() if channel is not None and schema is not None:
                 _read_message(recording, record, channel.topic, schema.name)
             case Footer():
                 recording.whole = True
+
+
+def note_head(recording: Recording, record: object) -> None:
+    """Keep the facts or the file of a record."""
+    match record:
+        case Metadata(name="roboglot"):
+            facts = {key: value for key, value in record.metadata.items() if key != "part"}
+            recording.facts = facts | recording.facts  # those of the first part, as when it was begun
+        case Attachment():
+            recording.attachments[record.name] = record.data
 
 
 def _read_message(recording: Recording, record: Message, topic: str, kind: str) -> None:

@@ -155,12 +155,16 @@ async def _pass(relay: Relay | DogRelay, words: str) -> None:
 
 
 @app.command()
-def info(file: Annotated[Path, typer.Argument(help="A recording.")]) -> None:
-    """Show the contents of a recording."""
+def info(
+    file: Annotated[Path, typer.Argument(help="A recording.")],
+    check: Annotated[bool, typer.Option("--check", help="Read every message, to find damage.")] = False,
+) -> None:
+    """Show the contents of a recording, from its index; without one, or with --check, by reading every message."""
+    from roboglot.recording.message_index import read_outline
     from roboglot.recording.reader import BadRecording, read_recording
 
     try:
-        recording = read_recording(file)
+        recording = read_recording(file) if check else read_outline(file)
     except (OSError, BadRecording) as error:
         sys.exit(f"roboglot record: {in_words(error)}")
     for name, value in recording.facts.items():
