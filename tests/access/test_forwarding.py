@@ -133,3 +133,26 @@ async def test_other_machines_need_a_name_behind_a_proxy(tmp_path: Path) -> None
         assert await answers(runtime, x_real_ip=ELSEWHERE) == [401, 401, 401]
         named = {"x_forwarded_for": ELSEWHERE, "authorization": f"Bearer {token}"}
         assert await answers(runtime, **named) == [200, 200, 200]
+
+
+@pytest.mark.parametrize(
+    ("headers", "secure"),
+    [
+        ({}, False),
+        ({"x-forwarded-for": ELSEWHERE, "x-forwarded-proto": "http"}, False),
+        ({"x-forwarded-for": ELSEWHERE, "x-forwarded-proto": "https"}, True),
+        ({"x-forwarded-proto": "https, http"}, False),
+        ({"forwarded": f'for={ELSEWHERE};Proto="https"'}, True),
+    ],
+)
+async def test_session_keeps_to_tls_behind_a_proxy(tmp_path: Path, headers: dict[str, str], secure: bool) -> None:
+    """The browser must not send the session's cookie over HTTP later."""
+    store = open_store(tmp_path)
+    token = store.add_machine("cell", [Grant("a", frozenset({Right.DRIVE}))])
+    store.close()
+    async with opened(tmp_path, on=True) as runtime, httpx.AsyncClient(timeout=60) as client:
+        console = known(runtime.console)
+        await console.ready()
+        reply = await client.post(f"{console.address}/api/sign_in", json={"token": token}, headers=headers)
+        assert reply.status_code == 200
+        assert ("secure" in reply.headers["set-cookie"].lower().split("; ")) is secure

@@ -40,6 +40,17 @@ def caller(peer: str, rows: Iterable[tuple[bytes, bytes]]) -> str:
     return f"{elsewhere}{THROUGH}{peer}" if elsewhere else peer
 
 
+def came_by_tls(rows: Iterable[tuple[bytes, bytes]]) -> bool:
+    """Return whether a proxy says, in header ``rows``, that its client's connection is encrypted."""
+    for name, value in rows:
+        text = value[-TEXT_MAX:].decode("latin-1").rpartition(",")[2].strip().lower()
+        if name == b"x-forwarded-proto" and text == "https":
+            return True
+        if name == b"forwarded" and "proto=https" in (pair.strip().replace('"', "") for pair in text.split(";")):
+            return True
+    return False
+
+
 def _address_of(hop: str) -> str:
     """Return the address of one hop: "10.0.0.7", "10.0.0.7:80", "[::1]:80" or one part of Forwarded, "for=…;by=…"."""
     text = hop.strip()

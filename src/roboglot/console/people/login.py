@@ -15,6 +15,7 @@ from roboglot.console.people.entry import address_of, admission_of, cookie_of
 from roboglot.console.people.sessions import Sessions, cookie_name, read_cookie, set_cookie
 from roboglot.console.settings import JOIN_TRIES
 from roboglot.model.admission import NO_PROOF, LockedOut, Proof, ProofKind, Unknown
+from roboglot.protocols.forwarding import came_by_tls
 from roboglot.transport.limiter import Limiter
 
 SIGN_IN, SIGN_OUT = "/api/sign_in", "/api/sign_out"
@@ -46,7 +47,7 @@ class Login:
         if scope["method"] != "POST":
             raise Problem(405, "signing in and out needs POST")
         name = cookie_name((scope.get("server") or ("", 0))[1] or 0)
-        secure = scope.get("scheme") == "https"
+        secure = scope.get("scheme") == "https" or came_by_tls(scope["headers"])
         if scope["path"] == SIGN_OUT:
             await self._sessions.end(cookie_of(scope))
             await answer_json(send, {"name": ""}, 200, [set_cookie(name, "", secure=secure)])
