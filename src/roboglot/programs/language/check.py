@@ -20,6 +20,8 @@ SOURCE_MAX = 256 * 1024
 """Characters of a program."""
 LINES_MAX = 20_000
 """Lines of a program."""
+DEPTH_MAX = 250
+"""Levels of the syntax tree: parts of one expression, or branches of one ``if``. Pythons differ in what they take."""
 PROBLEMS_MAX = 50
 """Findings reported at once."""
 _LOOKED_AT_MAX = 4 * PROBLEMS_MAX
@@ -87,7 +89,8 @@ def _parse(source: str) -> tuple[ast.Module | None, Problem | None]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return ast.parse(source.removeprefix("\ufeff")), None
+            tree = ast.parse(source.removeprefix("\ufeff"))
+        return (None, _too_deep()) if _is_deep(tree) else (tree, None)
     except SyntaxError as error:
         return None, from_syntax_error(error.msg, error.lineno or 1, max(1, error.offset or 1), error.text or "")
     except (RecursionError, MemoryError):
@@ -107,6 +110,13 @@ def _compile(tree: ast.Module, filename: str) -> CodeType | Problem:
         return _too_deep()
     except ValueError as error:
         return from_syntax_error(str(error), 1, 1)
+
+
+def _is_deep(tree: ast.Module) -> bool:
+    level: list[ast.AST] = [tree]
+    for _ in range(DEPTH_MAX):
+        level = [child for node in level for child in ast.iter_child_nodes(node)]
+    return bool(level)
 
 
 def _too_deep() -> Problem:

@@ -53,7 +53,7 @@ class Marks:
 
     def bind(self, code: CodeType) -> CodeType:
         """Return the code with the real objects in place of the placeholders."""
-        return code.replace(co_consts=tuple(self._bound(constant) for constant in code.co_consts))
+        return code.replace(co_consts=tuple(map(self._bound, code.co_consts)))
 
     def _bound(self, constant: object) -> object:
         if isinstance(constant, CodeType):
