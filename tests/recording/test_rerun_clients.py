@@ -175,7 +175,7 @@ async def test_a_teacher_stops_and_locks(tmp_path: Path) -> None:
             await session.clock.advance(0.5)
     recording = await identical(tmp_path)
     names = [given.name for _, given in recording.inputs if given.kind in ("program", "lease")]
-    assert names == ["end", "end", "end", "give", "release"]
+    assert names == ["end", "end", "give", "end", "release"]  # locked before its program ends: none starts in between
 
 
 async def test_unrepeatable_recordings_are_refused(tmp_path: Path) -> None:
