@@ -2,6 +2,7 @@
 
 import gc
 import os
+import shlex
 import sqlite3
 import subprocess
 import sys
@@ -21,7 +22,7 @@ from roboglot.cli import COMMANDS, loaded, screen, up
 
 def ended(*arguments: str, reader: str = "cat") -> "subprocess.CompletedProcess[str]":
     """Run ``python -m roboglot`` with its output going to ``reader``; its own status comes last."""
-    line = f"{sys.executable} -m roboglot {' '.join(arguments)} | {reader}; exit ${{PIPESTATUS[0]}}"
+    line = f"{shlex.quote(sys.executable)} -m roboglot {' '.join(arguments)} | {reader}; exit ${{PIPESTATUS[0]}}"
     return subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=False, timeout=180)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import shutil
 import sys
 from collections.abc import AsyncIterator
@@ -17,7 +18,7 @@ from tests.docs.test_docs import blocks
 
 RUN = {
     "sh": "bash first.sh",
-    "python": f"{sys.executable} first.py",
+    "python": f"{shlex.quote(sys.executable)} first.py",
     "js": "node --experimental-websocket first.mjs",
     "go": "GOFLAGS=-mod=mod GO111MODULE=off go run first.go",
 }

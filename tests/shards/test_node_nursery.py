@@ -186,7 +186,8 @@ def test_another_users_socket_is_not_used(
 
 
 def test_open_folder_is_not_used(folder: Path) -> None:
-    (folder / "roboglot").mkdir(mode=0o755)
+    (folder / "roboglot").mkdir()
+    (folder / "roboglot").chmod(0o755)  # whatever the umask
     with pytest.raises(PermissionError, match="not a folder of our own"):
         connect("node")
 

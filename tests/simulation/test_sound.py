@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import shlex
+import sys
 
 import numpy as np
 import pytest
@@ -145,8 +147,7 @@ async def test_without_voice_text_is_reported_but_not_heard(simulate, monkeypatc
     assert np.abs(wave).max() < 300
 
 
-FAKE_VOICE = """#!{python}
-import sys, wave
+FAKE_VOICE = """import sys, wave
 text = sys.stdin.read()
 with wave.open(sys.stdout.buffer, "wb") as file:
     file.setparams((1, 2, 24000, 0, "NONE", ""))
@@ -155,10 +156,9 @@ with wave.open(sys.stdout.buffer, "wb") as file:
 
 
 async def test_with_a_voice_a_text_is_heard(simulate, monkeypatch, tmp_path):
-    import sys
-
     program = tmp_path / "espeak-ng"
-    program.write_text(FAKE_VOICE.format(python=sys.executable))
+    (tmp_path / "voice.py").write_text(FAKE_VOICE)
+    program.write_text(f"#!/bin/sh\nexec {shlex.join([sys.executable, str(tmp_path / 'voice.py')])}\n")
     program.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
     run = simulate("empty")
