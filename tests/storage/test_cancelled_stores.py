@@ -14,6 +14,7 @@ from roboglot.model.events import EventStream
 from roboglot.model.geometry import Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.storage import postgresql
+from roboglot.storage.database import Database
 from roboglot.storage.members import StoredMembers
 from roboglot.storage.opening import open_database
 from roboglot.storage.places import StoredPlaces
@@ -112,3 +113,34 @@ async def test_time_that_is_up_stays_a_time_out(held: Held) -> None:
     with pytest.raises(TimeoutError):
         await change()
     assert settings.get("one") == 1
+
+
+def test_what_ends_with_its_loop_is_stored(tmp_path: Path) -> None:
+    """A loop cancels all tasks at its end, and waits for them: one that stored its last words waited forever."""
+    database, go = Database(tmp_path / "robot.db"), threading.Event()
+
+    def write(name: str) -> Work:
+        return lambda connection: connection.execute("INSERT INTO setting VALUES ('a', ?, '1')", (name,))
+
+    def slow(connection: Connection) -> None:
+        assert go.wait(60.0)
+        write("first")(connection)
+
+    async def program() -> None:
+        try:
+            await asyncio.Event().wait()
+        finally:
+            go.set()
+            async with asyncio.timeout(60.0):
+                await database.run_together(write("last words"))
+
+    async def main() -> None:
+        tasks = [asyncio.create_task(work) for work in (database.run_together(slow), program())]
+        for _ in range(3):
+            await asyncio.sleep(0)
+        assert not any(task.done() for task in tasks)
+
+    asyncio.run(main())
+    settings = StoredSettings(database, "a")
+    assert [settings.get(name) for name in ("first", "last words")] == [1, 1]
+    database.close()

@@ -43,7 +43,7 @@ class Database:
         self._connection = self._thread.submit(connect, str(path), schema).result()
         self._reader = None if self._in_place else _Reader(path)
         self._disk: Disk | None = None
-        self._together: list[tuple[Database, Work, asyncio.Future[Any]]] = []  # shared by the copies for single robots
+        self._together: list[_Waiting] = []  # shared by the copies for single robots
 
     def on(self, disk: Disk | None) -> Database:
         """Return the same file for the robot with this disk: while the disk is full, only ``remove`` may write."""
@@ -84,24 +84,31 @@ class Database:
         mine: asyncio.Future[T] = asyncio.get_running_loop().create_future()
         self._together.append((self, work, mine))
         if len(self._together) == 1:
-            self._flushing = asyncio.get_running_loop().create_task(self._flush(), name="transactions together")
+            asyncio.get_running_loop().call_soon(self._flush)  # with what others ask for meanwhile
         return await mine
 
-    async def _flush(self) -> None:
-        while self._together:
-            batch = tuple(self._together)
-            works = [(database, work) for database, work, _ in batch]
-            try:
-                results = await asyncio.get_running_loop().run_in_executor(self._thread, self._transact_all, works)
-            except Exception as broken:
-                results = [(None, broken)] * len(batch)
-            del self._together[: len(batch)]
-            for (_, _, waiting), (result, error) in zip(batch, results, strict=True):
-                if not waiting.done():
-                    waiting.set_result(result) if error is None else waiting.set_exception(error)
+    def _flush(self) -> None:
+        """Begin a transaction for all that wait. No task: at its end a loop cancels those, while callers may wait."""
+        batch = tuple(self._together)
+        works = [(database, work) for database, work, _ in batch]
+        try:
+            doing = asyncio.get_running_loop().run_in_executor(self._thread, self._transact_all, works)
+        except RuntimeError as closed:
+            self._settle(batch, [(None, closed)] * len(batch))
+        else:
+            doing.add_done_callback(lambda done: self._settle(batch, _results(done, len(batch))))
 
-    def _transact_all(self, works: list[tuple[Database, Work]]) -> list[tuple[object, Exception | None]]:
-        results: list[tuple[object, Exception | None]] = []
+    def _settle(self, batch: tuple[_Waiting, ...], results: list[_Result]) -> None:
+        """Give each caller of a batch its outcome; then begin with those that came meanwhile."""
+        del self._together[: len(batch)]
+        for (_, _, waiting), (result, error) in zip(batch, results, strict=True):
+            if not waiting.done():
+                waiting.set_result(result) if error is None else waiting.set_exception(error)
+        if self._together:
+            self._flush()
+
+    def _transact_all(self, works: list[tuple[Database, Work]]) -> list[_Result]:
+        results: list[_Result] = []
 
         def all_of_them(connection: Connection) -> None:
             for database, work in works:
@@ -161,6 +168,15 @@ class Database:
             self._reader.close()
         self._thread.submit(self._connection.close).result()
         self._thread.shutdown()
+
+
+_Waiting = tuple[Database, Work, asyncio.Future[Any]]
+_Result = tuple[object, BaseException | None]
+
+
+def _results(done: asyncio.Future[list[_Result]], count: int) -> list[_Result]:
+    broken = done.exception()
+    return done.result() if broken is None else [(None, broken)] * count
 
 
 def _without_cursor(result: T) -> T:
