@@ -26,9 +26,24 @@ class Pooler:
     def __init__(self, socket: Path, *, ignores: bool) -> None:
         self._socket, self._ignores = socket, ignores
         self._tasks: set[asyncio.Task[None]] = set()
+        self._writers: list[asyncio.StreamWriter] = []
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Serve one client."""
+        self._writers.append(writer)
+        with contextlib.suppress(asyncio.IncompleteReadError):  # it left
+            await self._begin(reader, writer)
+
+    async def close(self) -> None:
+        """Close all connections, whose clients may have left without a word."""
+        for writer in self._writers:
+            writer.close()
+        await asyncio.gather(*self._tasks)
+        for writer in self._writers:
+            with contextlib.suppress(OSError):
+                await writer.wait_closed()
+
+    async def _begin(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         while (opening := await self._opening(reader))[0] in ENCRYPTION:
             writer.write(b"N")
         version, words = opening
@@ -39,6 +54,7 @@ class Pooler:
             writer.close()
             return
         inside, to = await asyncio.open_unix_connection(self._socket)
+        self._writers.append(to)
         packed = b"".join(part + b"\0" for pair in values.items() for part in pair) + b"\0"
         to.write(struct.pack("!ii", 8 + len(packed), version) + packed)
         self._tasks |= {asyncio.create_task(self._pass_on(*ends)) for ends in ((reader, to), (inside, writer))}
@@ -61,8 +77,11 @@ async def pooled(server: PostgreSQLServer, *, ignores: bool) -> AsyncIterator[st
     pooler = Pooler(Path(folder) / ".s.PGSQL.5432", ignores=ignores)
     listening = await asyncio.start_server(pooler.serve, free_addresses(1), 0)
     host, port = listening.sockets[0].getsockname()
-    yield f"postgresql://robots@{host}:{port}/postgres"
-    listening.close()
+    try:
+        yield f"postgresql://robots@{host}:{port}/postgres"
+    finally:
+        listening.close()
+        await pooler.close()
 
 
 @needs_postgresql

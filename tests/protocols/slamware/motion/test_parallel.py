@@ -20,6 +20,8 @@ POIS = "/api/core/artifact/v1/pois"
 def sockets() -> Iterator[None]:
     """Both ends of each connection are in this process."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if hard < 3 * CLIENTS:
+        pytest.skip(f"a process may open {hard} files here")
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, max(soft, 3 * CLIENTS)), hard))
     yield
     resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
