@@ -115,7 +115,7 @@ async def test_time_that_is_up_stays_a_time_out(held: Held) -> None:
     assert settings.get("one") == 1
 
 
-def test_what_ends_with_its_loop_is_stored(tmp_path: Path) -> None:
+def test_last_words_are_stored_at_loops_end(tmp_path: Path) -> None:
     """A loop cancels all tasks at its end, and waits for them: one that stored its last words waited forever."""
     database, go = Database(tmp_path / "robot.db"), threading.Event()
 
