@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import json
 import zipfile
@@ -13,8 +14,9 @@ import pytest
 
 from roboglot.model.components.system.apps import Apps
 from roboglot.model.components.system.disk import Disk
-from roboglot.model.components.system.firmware import Firmware
+from roboglot.model.components.system.firmware import Firmware, FirmwareState
 from roboglot.model.robot import Robot
+from roboglot.simulation.components.system.firmware_record import FirmwareRecord
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
 
@@ -134,3 +136,51 @@ async def test_an_update_that_fails_says_so(
     progress = (await client.get(f"{FIRMWARE}/progress")).json()
     assert (progress["status"], progress["error_code"]) == (1, 1)
     assert robot[Firmware].version == version
+
+
+async def test_an_update_runs_once_it_is_accepted(
+    client: httpx.AsyncClient, forward: Forward, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def write(_record: FirmwareRecord, _package: object) -> None:
+        await asyncio.Event().wait()  # a slow disk
+
+    monkeypatch.setattr(FirmwareRecord, "put_downloaded", write)
+    await forward(seconds=1)
+    reply = (await client.post(f"{FIRMWARE}/update/:start", content=firmware("1.0.1"))).json()
+    assert reply["result"] is True
+    assert (await client.get(f"{FIRMWARE}/progress")).json()["status"] == 3
+
+
+async def test_a_waiting_package_is_no_running_update(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward
+) -> None:
+    """As a power cut during the installation, or another door, leaves it."""
+    await forward(seconds=1)
+    package = robot[Firmware].available
+    assert package is not None
+    download = robot[Firmware].download(package)
+    await forward(seconds=120)
+    assert download.status.ended
+    assert robot[Firmware].progress.state is FirmwareState.DOWNLOADED
+    progress = (await client.get(f"{FIRMWARE}/progress")).json()
+    assert (progress["current_step_name"], progress["status"]) == ("DownloadFinished", 2)
+
+
+async def test_a_running_update_is_not_begun_anew(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
+    await forward(seconds=1)
+    package = robot[Firmware].available
+    assert package is not None
+    download = robot[Firmware].download(package)  # as the robot itself, or another door, does
+    await forward(seconds=5)
+    share = robot[Firmware].progress.share
+    refused = (await client.post(f"{FIRMWARE}/autoupdate/:start")).json()
+    assert refused == {"result": False, "reason": "an update is under way"}
+    await forward(seconds=1)
+    assert not download.status.ended
+    assert robot[Firmware].progress.share > share > 0
+
+
+async def test_versions_have_no_control_characters(client: httpx.AsyncClient) -> None:
+    for package in (firmware("2.1\n0"), firmware("2.1\n"), firmware("2", modules={"a": "\x00"})):
+        reply = (await client.post(f"{FIRMWARE}/update/:start", content=package)).json()
+        assert reply["result"] is False

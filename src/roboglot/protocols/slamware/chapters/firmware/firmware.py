@@ -26,7 +26,7 @@ STEPS = ("Preparing", "PrepareFinished", "Downloading", "DownloadFinished", "Upd
 PROGRESS = {
     FirmwareState.IDLE: (0, INIT),
     FirmwareState.DOWNLOADING: (2, UPGRADE),
-    FirmwareState.DOWNLOADED: (3, UPGRADE),
+    FirmwareState.DOWNLOADED: (3, INIT),  # under way only while an update goes on to install it
     FirmwareState.INSTALLING: (4, UPGRADE),
     FirmwareState.INSTALLED: (5, SUCCESS),
     FirmwareState.REBOOTING: (5, SUCCESS),
@@ -97,7 +97,7 @@ def start_update(context: Context) -> Outcome:
     firmware = context.robot[Firmware]
     if firmware.available is None:
         return Outcome(result=False, reason="there is no newer version")
-    if context.updater.busy:
+    if context.updater.busy or firmware.progress.state not in IDLE:  # also one that the robot or another door began
         return Outcome(result=False, reason="an update is under way")
     context.updater.begin(firmware.available)
     return Outcome(result=True, reason="")
@@ -126,8 +126,11 @@ def get_firmware_progress(context: Context) -> UpdateProgress:
     """Return the progress of the update."""
     progress = context.robot[Firmware].progress
     step, status = PROGRESS[progress.state]
-    if context.updater.failed and status != SUCCESS:
-        status = ERROR
+    if progress.state in IDLE:
+        if context.updater.busy:  # it prepares, whatever an earlier update left
+            status = UPGRADE
+        elif context.updater.failed:
+            status = ERROR
     share = round(progress.share * 100)
     return UpdateProgress(step, STEPS[step], share, len(STEPS), status, int(status == ERROR))
 
