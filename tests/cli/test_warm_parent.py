@@ -283,7 +283,7 @@ def test_a_program_on_its_own_robot_starts_warm(tmp_path: Path) -> None:
 
 def test_another_users_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "roboglot").mkdir()
-    (tmp_path / "roboglot").chmod(0o755)  # whatever the umask
+    (tmp_path / "roboglot").chmod(0o755)  # readable by others, with any umask
     with pytest.raises(PermissionError):
         installation.folder_of({"XDG_RUNTIME_DIR": str(tmp_path)})
 

@@ -187,7 +187,7 @@ def test_another_users_socket_is_not_used(
 
 def test_open_folder_is_not_used(folder: Path) -> None:
     (folder / "roboglot").mkdir()
-    (folder / "roboglot").chmod(0o755)  # whatever the umask
+    (folder / "roboglot").chmod(0o755)  # readable by others, with any umask
     with pytest.raises(PermissionError, match="not a folder of our own"):
         connect("node")
 

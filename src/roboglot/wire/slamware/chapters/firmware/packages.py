@@ -25,7 +25,7 @@ STORED, DEFLATED = 0, 8  # methods, Android's and every build tool's. bzip2 make
 ENCRYPTED = 1  # flag of an entry
 END, ZIP64_END, ENTRY, LOCAL = b"PK\5\6", b"PK\6\7", b"PK\1\2", b"PK\3\4"
 END_HEAD, ENTRY_HEAD, LOCAL_HEAD = struct.Struct("<12xII2x"), struct.Struct("<8xHH4xIII14xI"), struct.Struct("<26xHH")
-NO_CONTROLS = r"^[^\x00-\x1f\x7f]*\Z"  # a pattern
+NO_CONTROLS = r"^[^\x00-\x1f\x7f]*\Z"  # versions are shown in answers, logs and lines
 Text = Annotated[str, msgspec.Meta(min_length=1, max_length=64, pattern=NO_CONTROLS)]
 
 
