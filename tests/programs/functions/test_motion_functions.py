@@ -12,6 +12,7 @@ from roboglot.model.components.motion.driving import BASE, Driving
 from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.geometry import Pose, Twist
+from roboglot.programs.functions.moving.performing import RESULT_MOTIONS
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.simulation.world.world import World
 from roboglot.testing import assert_pose
@@ -177,6 +178,23 @@ async def test_lying_down_standing_up_and_going_limp(caller: Caller) -> None:
     assert legs.posture is Posture.LIMP
     await caller("cyberdog.motion.resume_standing")
     assert legs.posture is Posture.STANDING
+
+
+async def test_limp_robot_only_stands_up(caller: Caller, world: World) -> None:
+    legs, before = caller.robot[Legs], world.truth.pose_of("a")
+    legs.go_limp()
+    await caller.clock.advance(2.0)
+    calls: list[tuple[str, tuple[float, ...]]] = [(name, ()) for name, _, _ in RESULT_MOTIONS]
+    calls += [("walk_the_dog", ()), ("go_straight", (0.1, 0, 0)), ("trot_walking", (0.1,)), ("turn", (20,))]
+    calls += [("absolute_attitude", (0.2, 5)), ("transition_standing", (0.2,)), ("get_down", ())]
+    calls += [("relatively_force_control_attitude", (0.0, 0.0, 0.02)), ("jump_back_and_forth", (0.03,))]
+    for name, arguments in calls:
+        answer = await caller(f"cyberdog.motion.{name}", *arguments)
+        assert (field(answer, "state.code"), field(answer, "response.code")) == (1, 3040), name
+        assert legs.posture is Posture.LIMP, name
+    await caller.clock.advance(5.0)
+    assert world.truth.pose_of("a").distance_to(before) < 0.02
+    assert field(await caller("cyberdog.motion.resume_standing"), "response.code") == 0
 
 
 async def test_lying_robot_stands_up_to_walk(caller: Caller, world: World) -> None:
