@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -13,7 +15,7 @@ from roboglot.access.rights import effective, parse_rights, write_rights
 from roboglot.access.secrets import password_fits, password_hash, token_hash
 from roboglot.access.store import FILE, Grant, IdentityKind, open_store
 from roboglot.access.trail import Entry, open_trail
-from roboglot.cli.access import _end
+from roboglot.cli.access import _end, _moment
 from roboglot.operations import Right
 
 
@@ -96,6 +98,35 @@ def test_times_of_people_are_understood() -> None:
     for wrong in (("25:00", ""), ("", "2 weeks"), ("18:00", "2h")):
         with pytest.raises(ValueError, match="--"):
             _end(*wrong)
+
+
+@pytest.fixture
+def local_zone(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """The time zone of this machine: the fixture's parameter."""
+    with monkeypatch.context() as patch:
+        patch.setenv("TZ", request.param)
+        time.tzset()
+        yield
+    time.tzset()
+
+
+@pytest.mark.parametrize("local_zone", ["America/New_York", "Asia/Shanghai"], indirect=True)
+@pytest.mark.parametrize(
+    ("until", "lasts"),
+    [("2020-01-31T18:00", ""), ("1900-01-01", ""), ("0001-01-01", ""), ("", "0s"), ("9999-12-31T23:59:59-12:00", "")],
+)
+@pytest.mark.usefixtures("local_zone")
+def test_ends_past_or_beyond_calendars_are_refused(until: str, lasts: str) -> None:
+    with pytest.raises(ValueError, match=r"not in the future|beyond the year 9999|--until is"):
+        _end(until, lasts)
+
+
+@pytest.mark.parametrize("local_zone", ["Europe/Berlin"], indirect=True)
+@pytest.mark.usefixtures("local_zone")
+def test_clock_times_follow_changes_of_clocks() -> None:
+    evening = datetime.fromisoformat("2026-03-28T20:00").astimezone()  # the night in which summer time begins
+    assert _moment("11:00", evening) == datetime(2026, 3, 29, 9, tzinfo=UTC)
+    assert _moment("21:00", evening) == datetime(2026, 3, 28, 20, tzinfo=UTC)
 
 
 def test_passwords_are_kept_as_scrypt() -> None:

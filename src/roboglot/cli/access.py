@@ -142,25 +142,39 @@ def _grants(rights: str, robots: str, until: str, lasts: str) -> list[Grant]:
 
 
 def _end(until: str, lasts: str) -> float | None:
-    """Return the end of a right (Unix s); None: unlimited. Raises ValueError."""
+    """Return the end of a right (Unix s); None: unlimited. Raises ValueError, also for an end that is past."""
     now = datetime.now().astimezone()
     if until and lasts:
         raise ValueError("give either --until or --for")
-    if lasts:
-        match = re.fullmatch(r"(\d{1,6})\s*(s|min|h|d)", lasts)
-        if match is None:
-            raise ValueError(f"--for is a time such as 2h, 45min or 30d, not {lasts!r}")
-        return (now + timedelta(seconds=int(match[1]) * UNITS[match[2]])).timestamp()
-    if not until:
+    if not until and not lasts:
         return None
     try:
-        if re.fullmatch(r"\d{1,2}:\d{2}", until):
-            clock = datetime.strptime(until, "%H:%M").time()  # noqa: DTZ007 - of the day, here
-            moment = datetime.combine(now.date(), clock).astimezone()
-            return (moment if moment > now else moment + timedelta(days=1)).timestamp()
-        return datetime.fromisoformat(until).astimezone().timestamp()
+        end = _after(lasts, now) if lasts else _moment(until, now).timestamp()
+    except OverflowError:
+        raise ValueError(f"{until or lasts!r} is beyond the year 9999") from None
+    if end <= now.timestamp():
+        raise ValueError(f"the rights would end at once: {until or lasts!r} is not in the future")
+    return end
+
+
+def _after(lasts: str, now: datetime) -> float:
+    """Return the end of a duration that begins now. Raises ValueError."""
+    match = re.fullmatch(r"(\d{1,6})\s*(s|min|h|d)", lasts, re.ASCII)
+    if match is None:
+        raise ValueError(f"--for is a time such as 2h, 45min or 30d, not {lasts!r}")
+    return (now + timedelta(seconds=int(match[1]) * UNITS[match[2]])).timestamp()
+
+
+def _moment(until: str, now: datetime) -> datetime:
+    """Return a moment by the clock of this machine: today's or tomorrow's, if no day is given. Raises ValueError."""
+    try:
+        if not re.fullmatch(r"\d{1,2}:\d{2}", until, re.ASCII):
+            return datetime.fromisoformat(until).astimezone()
+        clock = datetime.strptime(until, "%H:%M").time()  # noqa: DTZ007 - of the day, here
     except ValueError:
         raise ValueError(f"--until is 18:00 or 2027-01-31T18:00, not {until!r}") from None
+    today = datetime.combine(now.date(), clock).astimezone()
+    return today if today > now else datetime.combine(now.date() + timedelta(days=1), clock).astimezone()
 
 
 def _password() -> str:
