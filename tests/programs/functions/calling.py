@@ -15,9 +15,9 @@ from roboglot.programs.functions.table import call
 class Caller:
     """``await caller("cyberdog.motion.turn", 90)`` lets robot time pass until the call returns."""
 
-    def __init__(self, robot: Robot, clock: LockstepClock) -> None:
+    def __init__(self, robot: Robot, clock: LockstepClock, task: str = "t") -> None:
         ability_set()  # loads the functions
-        self.session = Session(robot, "t", self)
+        self.session = Session(robot, task, self)
         self.robot = robot
         self.clock = clock
         self.blocks: list[str] = []

@@ -16,6 +16,12 @@ async def caller(robot: Robot, clock: LockstepClock) -> Caller:
 
 
 @pytest.fixture
+async def second_caller(robot: Robot, clock: LockstepClock) -> Caller:
+    """Another program's calls on the same robot."""
+    return Caller(robot, clock, "second")
+
+
+@pytest.fixture
 async def bare_caller(clock: LockstepClock) -> Caller:
     """A program's calls on a robot without parts."""
     plate = dict.fromkeys(("maker", "model", "serial", "hardware_version", "software_version"), "")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -16,6 +17,7 @@ from roboglot.model.components.interaction.light import (
 )
 from roboglot.model.components.interaction.speaker import Speaker
 from roboglot.model.components.sensing.microphone import Microphone
+from roboglot.model.errors import RobotError
 from roboglot.model.events import SoundPlayed, Spoke
 from roboglot.model.sensing import BatteryState
 from roboglot.model.sound import Sound
@@ -117,6 +119,68 @@ async def test_lights_are_given_back(caller: Caller) -> None:
     assert light.state("head").colour == Colour(7, 7, 7)
 
 
+RED, BLUE = Colour(255, 0, 0), Colour(0, 0, 255)
+
+
+@pytest.mark.parametrize("first_ends", [True, False])
+async def test_two_programs_take_one_light(caller: Caller, second_caller: Caller, first_ends: bool) -> None:
+    """The first program's end darkened the second's light, and the second's end left the first's for good."""
+    light = caller.robot[Light]
+    light.shine("head", Colour(7, 7, 7), LightEffect.BREATH, frequency=1.0)
+    await caller("cyberdog.led.play_rgb", 1, 1, 255, 0, 0)
+    await second_caller("cyberdog.led.play_rgb", 1, 1, 0, 0, 255)
+    ending, other = (caller, second_caller) if first_ends else (second_caller, caller)
+    ending.session.cancel("the program has ended")
+    assert light.state("head").colour == (BLUE if first_ends else RED)
+    assert code(await other("cyberdog.led.freed", 1)) == 0
+    shown = light.state("head")
+    assert (shown.colour, shown.effect, shown.frequency) == (Colour(7, 7, 7), LightEffect.BREATH, 1.0)
+
+
+async def test_lights_of_programs_in_turn(caller: Caller, second_caller: Caller) -> None:
+    light = caller.robot[Light]
+    for program in (caller, second_caller, caller):
+        await program("cyberdog.led.play_rgb", 2, 1, 255, 0, 0)
+        await program("cyberdog.led.play_rgb", 1, 1, 255 * (program is caller), 0, 255 * (program is second_caller))
+    caller.session.cancel("the program has ended")
+    assert light.state("head").colour == BLUE
+    second_caller.session.cancel("the program has ended")
+    assert {light.state(zone).effect for zone in ("head", "tail")} == {LightEffect.OFF}
+
+
+async def test_lights_of_another_client_stay(caller: Caller) -> None:
+    light = caller.robot[Light]
+    await caller("cyberdog.led.play_rgb", 1, 1, 255, 0, 0)
+    light.shine("head", Colour(1, 2, 3), LightEffect.SOLID)
+    caller.session.cancel("the program has ended")
+    assert light.state("head").colour == Colour(1, 2, 3)
+    await caller("cyberdog.led.play_rgb", 1, 1, 255, 0, 0)
+    await caller("cyberdog.led.freed", 1)
+    assert light.state("head").colour == Colour(1, 2, 3)
+
+
+async def test_one_stuck_light_keeps_no_others(caller: Caller, monkeypatch: pytest.MonkeyPatch) -> None:
+    light = caller.robot[Light]
+    for target in (1, 2, 3):
+        await caller("cyberdog.led.play_rgb", target, 48 if target == 3 else 1, 255, 0, 0)
+    shine = light.shine
+
+    def stuck(zone: str, *args: Any, **kwargs: Any) -> None:
+        if zone == "head":
+            raise RobotError("the head does not answer")
+        shine(zone, *args, **kwargs)
+
+    monkeypatch.setattr(light, "shine", stuck)
+    caller.session.cancel("the program has ended")
+    assert [light.state(zone).effect for zone in ("tail", "eyes")] == [LightEffect.OFF] * 2
+
+
+@pytest.mark.world("empty", body="hermes")
+async def test_no_such_light_is_not_freed(caller: Caller) -> None:
+    assert code(await caller("cyberdog.led.play", 1, 161)) == 1121
+    assert code(await caller("cyberdog.led.freed", 1)) == 1121
+
+
 class NearlyEmpty(Battery):
     @property
     def state(self) -> BatteryState:
@@ -141,6 +205,22 @@ async def test_saying_takes_its_time_and_its_turn(caller: Caller) -> None:
         texts = [(await said.next()).text for _ in range(2)]
     assert texts == ["one two three four five six", "hello world again"]
     assert field(await caller("cyberdog.audio.get_volume"), "response.volume") == 30
+
+
+async def test_programs_speak_in_turn(caller: Caller, second_caller: Caller) -> None:
+    """Of two that waited for a third, one was cut off by the other, and failed."""
+    third = Caller(caller.robot, caller.clock, "third")
+    with caller.robot.events.subscribe(Spoke) as said:
+        speaking = [
+            program.start("cyberdog.audio.play", text, 40)
+            for program, text in ((caller, "one one one"), (second_caller, "two two two"), (third, "three three"))
+        ]
+        for _ in range(600):
+            await caller.clock.advance(0.05)
+            if all(call.done() for call in speaking):
+                break
+        assert [field(call.result(), "response.status") for call in speaking] == [0, 0, 0]
+        assert {(await said.next()).text for _ in speaking} == {"one one one", "two two two", "three three"}
 
 
 async def test_at_once_takes_over(caller: Caller) -> None:

@@ -84,10 +84,20 @@ def usable_volume(volume: int) -> int:
 
 async def say(session: Session, what: str | int, volume: int = UNCHANGED) -> None:
     """Wait until the speaker is free, then say a text or play a sound to its end. Raises RobotError."""
-    for other in session.robot.actions.running(SPEAKER):
-        await other.done()
+    _check_sound(what)
+    await _silence(session)
+    if volume != UNCHANGED:
+        await turn_to(session.robot[Speaker], volume)
+        await _silence(session)  # another may have begun while the volume was stored
+    await session.complete(_begin(session, what))
+
+
+async def _silence(session: Session) -> None:
+    """Wait until nothing sounds and the program is not paused; of several that wait, one begins, the others go on."""
     await session.unpaused()
-    await session.complete(await _begin(session, what, volume))
+    while sounding := session.robot.actions.running(SPEAKER):
+        await sounding[0].done()
+        await session.unpaused()
 
 
 async def comment(session: Session, what: str) -> None:
@@ -110,20 +120,25 @@ async def _played(session: Session, what: str | int, volume: int) -> Record:
 
 async def _started(session: Session, what: str | int, volume: int) -> Record:
     try:
-        await _begin(session, what, volume)
+        _check_sound(what)  # before the volume changes
+        await turn_to(session.robot[Speaker], volume)
+        _begin(session, what)
     except RobotError as error:
         return state(StateCode.FAIL, str(error))
     return state()
 
 
-async def _begin(session: Session, what: str | int, volume: int) -> Action:
+def _check_sound(what: str | int) -> None:
+    """Raise NotFound for the number of no sound, InvalidGoal for a text that cannot be said."""
+    if isinstance(what, str):
+        check_text(what)
+    elif what not in BARKS.keys() | PIECES.keys():
+        raise NotFound(f"there is no sound {what}; there are: {', '.join(map(str, [*BARKS, *PIECES]))}")
+
+
+def _begin(session: Session, what: str | int) -> Action:
     """Start saying a text, or playing the sound of a number."""
     speaker = session.robot[Speaker]
-    if isinstance(what, int) and what not in BARKS.keys() | PIECES.keys():
-        raise NotFound(f"there is no sound {what}; there are: {', '.join(map(str, [*BARKS, *PIECES]))}")
-    if isinstance(what, str):
-        check_text(what)  # before the volume changes
-    await turn_to(speaker, volume)
     if isinstance(what, int):
         sound = PIECES[what]() if what in PIECES else bark(what)
         return speaker.play(sound, source=session.source)

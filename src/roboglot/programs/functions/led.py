@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.interaction.light import Colour, Light, LightEffect, ZoneState
 from roboglot.model.errors import InvalidGoal, NotFound, RobotError
@@ -58,30 +60,68 @@ SYSTEM_EYES: dict[int, tuple[Look, Colour]] = {
 }
 
 
+class HeldZone:
+    """A zone that programs have taken: its state before, and each program's look, that of the last request last."""
+
+    def __init__(self, before: ZoneState) -> None:
+        self.before = self.shown = before  # ``shown``: after the programs' last command
+        self.looks: dict[object, ZoneState] = {}
+
+
+_held: WeakKeyDictionary[Light, dict[str, HeldZone]] = WeakKeyDictionary()
+
+
 class HeldLights:
-    """Zones that the program has taken, with their earlier states."""
+    """Zones that the program has taken. Other programs and clients may take them, too: the last request is shown."""
 
     def __init__(self, session: Session) -> None:
         self._light = session.robot[Light]
-        self._before: dict[str, ZoneState] = {}
+        self._zones = _held.setdefault(self._light, {})
+        self._me = object()  # stands for this program, and keeps nothing of it alive
 
     def shine(self, zone: str, look: Look, colour: Colour) -> None:
         """Take the zone and show an effect. Raises like ``Light.shine``."""
         before = self._light.state(zone)
         effect, frequency = look
         self._light.shine(zone, colour, effect, frequency=frequency)
-        self._before.setdefault(zone, before)
+        held = self._zones.get(zone)
+        if held is None or held.shown != before:  # another client's command ends what programs showed
+            held = self._zones[zone] = HeldZone(before)
+        held.looks.pop(self._me, None)
+        held.looks[self._me] = held.shown = self._light.state(zone)
 
     def free(self, zone: str) -> None:
-        """Restore a zone's earlier state; do nothing if it is not held. Raises like ``Light.shine``."""
-        if before := self._before.get(zone):
-            self._light.shine(zone, before.colour, before.effect, frequency=before.frequency)
-            del self._before[zone]
+        """Give a zone back: to the program that asked before, or to its state before all of them.
+
+        Changes nothing if it is not held, or if another program or client has commanded it since. Raises like
+        ``Light.shine``.
+        """
+        shown = self._light.state(zone)
+        held = self._zones.get(zone)
+        if held is None or self._me not in held.looks:
+            return
+        others = {program: look for program, look in held.looks.items() if program is not self._me}
+        if shown == held.shown == held.looks[self._me]:
+            back = next(reversed(others.values()), held.before)
+            self._light.shine(zone, back.colour, back.effect, frequency=back.frequency)
+            held.shown = self._light.state(zone)
+            if others:
+                others[next(reversed(others))] = held.shown
+        held.looks = others
+        if not others:
+            del self._zones[zone]
 
     def close(self) -> None:
-        """Restore all zones."""
-        for zone in tuple(self._before):
-            self.free(zone)
+        """Give all zones back, even if one cannot be. Raises like ``Light.shine``."""
+        failure: RobotError | None = None
+        for zone, held in tuple(self._zones.items()):
+            try:
+                self.free(zone)
+            except RobotError as error:
+                failure = error
+                held.looks.pop(self._me, None)
+        if failure is not None:
+            raise failure
 
 
 @ABILITIES.on("cyberdog.led.play", needs=(Light,))
@@ -100,11 +140,13 @@ async def play_rgb(session: Session, target: int, effect: int, r: int, g: int, b
 
 @ABILITIES.on("cyberdog.led.freed", needs=(Light,))
 async def freed(session: Session, target: int) -> Record:
-    """Release the light: it shows again what it did before the program took it."""
+    """Release the light: it shows again what it did before, unless others have taken it since."""
     if target not in ZONES:
         return _answer(TARGET_ERROR, "no such light")
     try:
         session.part(HeldLights).free(ZONES[target])
+    except NotFound as error:
+        return _answer(TARGET_ERROR, str(error))
     except RobotError as error:
         return _answer(NO_ANSWER, str(error))
     return _answer(0)
