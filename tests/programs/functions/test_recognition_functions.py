@@ -80,10 +80,20 @@ async def test_no_gesture_in_time_is_no_failure(caller: Caller, anna: Actor) -> 
     assert caller.robot[Vision].gestures.latest is None
 
 
+async def test_gestures_of_busy_seconds_count(caller: Caller, anna: Actor) -> None:
+    """They were lost where the program did something else for more than four pictures."""
+    await caller("cyberdog.gesture.turn_on_recognition", 30)
+    anna.gesture(Gesture.STOP, seconds=1)
+    await caller("time.sleep", 6.0)
+    result = await caller("cyberdog.gesture.recognized_any_gesture", 30, 10)
+    assert field(result, "data").fields == {"stop_sign": True}
+
+
 @pytest.mark.slow
 async def test_recognition_ends_by_itself(caller: Caller, anna: Actor) -> None:
     await caller("cyberdog.gesture.turn_on_recognition", 30)
     await caller.clock.advance(31.0)
+    assert caller.robot[Vision].gestures.latest is None  # nothing looks any more
     assert field(await caller("cyberdog.gesture.recognized_any_gesture", 30), "state.code") == 1
 
 
@@ -118,6 +128,28 @@ async def test_squats_are_counted_while_the_program_goes_on(caller: Caller, anna
     last = await caller("cyberdog.skeleton.instant_recognized")
     assert field(last, "response").fields == {"algo_switch": 1, "sport_type": 1, "counts": 3, "duration": 0}
     assert field(await caller("cyberdog.skeleton.blocking_recognized", 30), "state.code") == 1
+
+
+async def test_nothing_counts_after_the_time(caller: Caller, anna: Actor) -> None:
+    """A program that looked later saw counts of after the time, or even all that it had asked for."""
+    await caller("cyberdog.skeleton.turn_on_recognition", 1, 4, 5)
+    anna.do_sport(Sport.SQUAT, count=6, period=2.0)
+    await caller.clock.advance(5.5)
+    assert caller.robot[Vision].skeletons.latest is None
+    await caller.clock.advance(8.0)
+    last = field(await caller("cyberdog.skeleton.instant_recognized"), "response").fields
+    assert (last["algo_switch"], last["counts"]) == (2, 2)
+
+
+async def test_counts_begin_anew(caller: Caller, anna: Actor) -> None:
+    await caller("cyberdog.skeleton.turn_on_recognition", 1, 10, 60)
+    anna.do_sport(Sport.SQUAT, count=3, period=1.5)
+    await caller.clock.advance(5.0)
+    assert field(await caller("cyberdog.skeleton.instant_recognized"), "response.counts") == 3
+    await caller("cyberdog.skeleton.turn_on_recognition", 1, 2, 60.5)  # the manual: seconds, as a fraction
+    await caller.clock.advance(1.0)
+    last = field(await caller("cyberdog.skeleton.instant_recognized"), "response").fields
+    assert (last["algo_switch"], last["counts"]) == (0, 0)
 
 
 async def test_a_plank_is_timed(caller: Caller, anna: Actor) -> None:
@@ -239,6 +271,7 @@ async def test_members_are_known_by_their_voices(caller: Caller, world: World, a
         ("voiceprint_recognized", (["unknown"], False, 3)),
         ("voiceprint_recognized", ([], False, 31)),
         ("voiceprint_recognized", ([], False, 3, -1)),
+        ("voiceprint_recognized", ([], False, 3, 10**400)),
     ],
 )
 async def test_people_who_cannot_be_recognised(caller: Caller, name: str, args: tuple[object, ...]) -> None:
@@ -261,7 +294,8 @@ async def test_phrases_that_are_known(caller: Caller, anna: Actor) -> None:
     assert word == {"trigger": "暂停任务", "type": "vp_task", "value": "suspend"}
     nothing = await caller("cyberdog.train.training_words_recognized", 5)
     assert (field(nothing, "state.code"), field(nothing, "response").fields) == (0, {})
-    assert field(await caller("cyberdog.train.training_words_recognized", 4), "state.code") == 1
+    for seconds in (4, 4.9, 300.1):
+        assert field(await caller("cyberdog.train.training_words_recognized", seconds), "state.code") == 1
 
 
 async def test_a_word_that_someone_teaches_is_understood(caller: Caller, anna: Actor) -> None:

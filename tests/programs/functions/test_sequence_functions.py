@@ -13,6 +13,7 @@ from roboglot.model.components.motion.feet import Foot
 from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.errors import ComponentMissing, InvalidGoal
 from roboglot.model.geometry import Pose
+from roboglot.programs.functions.moving.choreography import Choreography
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.worker.records import Records
 from roboglot.programs.worker.values import Record, pack, unpack
@@ -200,6 +201,8 @@ async def test_push_ups_are_counted_by_the_bodys_height(caller: Caller) -> None:
     await ready(caller)
     legs = caller.robot[Legs]
     stood = legs.body_height
+    await caller("choreographer.push_up", 10**400, -(10**400))  # limited to 60 a minute, and to two
+    assert len(caller.session.part(Choreography).steps) == 4
     await caller("choreographer.push_up", 30, 3)
     dancing, low, count = caller.start("dancer.dance"), False, 0
     start = caller.clock.time()

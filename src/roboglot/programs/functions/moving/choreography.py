@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 from roboglot.model.components.motion.feet import Foot, Footfall
@@ -83,6 +82,6 @@ async def dance(session: Session) -> None:
 
 
 def _cut(value: float, least: float, most: float) -> float:
-    if math.isnan(value):
+    if value != value:  # math.isnan takes no whole number beyond the largest float
         raise ValueError("not a number")
     return max(least, min(most, value))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 
 from roboglot.model.components.sensing.vision import Vision
@@ -32,13 +33,14 @@ KINDS: dict[Gesture, str] = dict(
 
 
 class GestureWatch:
-    """Looks for gestures until its time is up; keeps the time of each gesture's last sighting."""
+    """Looks for gestures in the background until its time is up; keeps the time of each gesture's last sighting."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
         self._viewer: Viewer[Sighting[GestureSeen]] | None = None
         self._until = 0.0
         self._seen: dict[str, float] = {}
+        self._watching: asyncio.Task[None] | None = None
 
     @property
     def on(self) -> bool:
@@ -47,9 +49,11 @@ class GestureWatch:
 
     def open(self, seconds: float) -> None:
         """Look for gestures for ``seconds`` from now. Raises ComponentMissing, Busy."""
-        if self._viewer is None:
+        if not self.on:
+            self.close()
             self._viewer = self._session.robot[Vision].gestures.subscribe()
             self._seen.clear()
+            self._watching = asyncio.create_task(self._watch(self._viewer), name="look for gestures")
         self._until = self._session.robot.clock.time() + seconds
 
     def close(self) -> None:
@@ -60,12 +64,20 @@ class GestureWatch:
 
     def seen(self, within: float) -> set[str]:
         """Return the gestures seen within the last ``within`` seconds, by the manual's names."""
-        for sighting in self._viewer.drain() if self._viewer else ():
+        since = self._session.robot.clock.time() - within
+        return {name for name, stamp in self._seen.items() if stamp >= since}
+
+    async def _watch(self, viewer: Viewer[Sighting[GestureSeen]]) -> None:
+        """Note what is seen until the time is up, or recognition is switched off."""
+        async for sighting in viewer:
+            if viewer.closed:
+                return
+            if sighting.stamp >= self._until:
+                self.close()
+                return
             for gesture in sighting.seen:
                 if gesture.gesture in KINDS:
                     self._seen[KINDS[gesture.gesture]] = sighting.stamp
-        since = self._session.robot.clock.time() - within
-        return {name for name, stamp in self._seen.items() if stamp >= since}
 
 
 @ABILITIES.on("cyberdog.gesture.turn_on_recognition", needs=(Vision,))

@@ -107,7 +107,7 @@ async def get_training_words_set(session: Session) -> Record:
 
 
 @ABILITIES.on("cyberdog.train.training_words_recognized", needs=(Hearing,))
-async def training_words_recognized(session: Session, timeout: int = 5) -> Record:
+async def training_words_recognized(session: Session, timeout: float = 5.0) -> Record:
     """Wait until one of these words is said (5 to 300 s); without one in time, it is empty: no failure."""
     outcome, word = state(), Record("MsgTrainingWords")
     try:
@@ -162,4 +162,5 @@ def _enough(found: Iterable[str], wanted: set[str], everyone: object) -> bool:
 
 def _check(name: str, value: float, least: float, most: float) -> None:
     if not least <= value <= most:
-        raise InvalidGoal(f"{name} = {value:g} is outside of {least:g} to {most:g} s")
+        given = f"{value:g}" if isinstance(value, float) else str(value)  # a whole number may be too large for ``g``
+        raise InvalidGoal(f"{name} = {given} is outside of {least:g} to {most:g} s")

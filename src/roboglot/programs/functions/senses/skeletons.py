@@ -41,7 +41,7 @@ class ExerciseWatch:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._switch = Switch.CLOSED
-        self._sport_type = self._wanted = 0
+        self._sport_type = 0
         self._until = 0.0
         self._counter: SportCounter | None = None
         self._viewer: Viewer[Sighting[SkeletonSeen]] | None = None
@@ -56,7 +56,7 @@ class ExerciseWatch:
         counts, seconds = (counter.count, int(counter.duration)) if counter else (0, 0)
         return self._switch, self._sport_type, counts, seconds
 
-    def open(self, sport_type: int, counts: int, timeout: int) -> None:
+    def open(self, sport_type: int, counts: int, timeout: float) -> None:
         """Start counting from 0. Raises InvalidGoal, ComponentMissing, Busy."""
         if sport_type not in SPORTS:
             raise InvalidGoal(f"sport_type = {sport_type} does not exist")
@@ -66,27 +66,35 @@ class ExerciseWatch:
         self.close()
         self._viewer = self._session.robot[Vision].skeletons.subscribe()
         self._counter = SportCounter(SPORTS[sport_type])
-        self._sport_type, self._wanted, self._switch = sport_type, counts, Switch.OPEN
+        self._sport_type, self._switch = sport_type, Switch.OPEN
         self._until = self._session.robot.clock.time() + seconds
-        self._watching = asyncio.create_task(self._watch(self._viewer, self._counter), name="count exercises")
+        watch = self._watch(self._viewer, self._counter, counts, self._until)
+        self._watching = asyncio.create_task(watch, name="count exercises")
 
     def close(self) -> None:
         """Stop counting."""
         if self._switch is Switch.OPEN:
             self._end(Switch.CLOSED)
 
-    async def _watch(self, viewer: Viewer[Sighting[SkeletonSeen]], counter: SportCounter) -> None:
+    async def _watch(
+        self, viewer: Viewer[Sighting[SkeletonSeen]], counter: SportCounter, wanted: int, until: float
+    ) -> None:
+        """Count until ``wanted`` or the robot time ``until``; what was seen later does not count."""
         who: int | None = None
         async for sighting in viewer:
+            if viewer.closed:  # counting was ended, or began anew, before this was read
+                return
+            if sighting.stamp >= until:
+                self._end(Switch.TIMEOUT)
+                return
             for skeleton in sighting.seen:
                 who = skeleton.number if who is None else who
                 if skeleton.number == who:
                     counter.see(skeleton, sighting.stamp)
             done = counter.duration if counter.sport is Sport.PLANK else counter.count
-            if done >= self._wanted:
-                self._switch = Switch.COMPLETE
-                break
-        viewer.close()
+            if done >= wanted:
+                self._end(Switch.COMPLETE)
+                return
 
     def _end(self, why: Switch) -> None:
         self._switch = why
@@ -95,7 +103,7 @@ class ExerciseWatch:
 
 
 @ABILITIES.on("cyberdog.skeleton.turn_on_recognition", needs=(Vision,))
-async def turn_on_recognition(session: Session, sport_type: int, counts: int, timeout: int = 100) -> Record:
+async def turn_on_recognition(session: Session, sport_type: int, counts: int, timeout: float = 100.0) -> Record:
     """Count a sport (SkeletonType) up to ``counts`` (a plank's seconds) for at most ``timeout`` s, 5 to 300."""
     try:
         session.part(ExerciseWatch).open(sport_type, counts, timeout)
@@ -118,7 +126,7 @@ async def instant_recognized(session: Session) -> Record:
 
 
 @ABILITIES.on("cyberdog.skeleton.blocking_recognized", needs=(Vision,))
-async def blocking_recognized(session: Session, timeout: int = 100) -> Record:
+async def blocking_recognized(session: Session, timeout: float = 100.0) -> Record:
     """Wait for the next repetition, second of a plank, or end of counting; at most ``timeout`` s, 5 to 300."""
     watch = session.part(ExerciseWatch)
     try:
@@ -136,7 +144,7 @@ async def sports_recognition(
     session: Session,
     sport_type: int,
     counts: int,
-    timeout: int = 100,
+    timeout: float = 100.0,
     interact: bool = True,
     instantly: bool = True,
     volume: int = 50,
@@ -172,10 +180,10 @@ async def _change(session: Session, watch: ExerciseWatch, seconds: float) -> boo
     return watch.progress[2:] != before[2:]
 
 
-def usable(timeout: int) -> float:
+def usable(timeout: float) -> float:
     """Return a timeout, s. Raises InvalidGoal beyond 5 to 300 s."""
     if not TIMEOUT_MIN <= timeout <= TIMEOUT_MAX:
-        raise InvalidGoal(f"timeout = {timeout} is outside of {TIMEOUT_MIN} to {TIMEOUT_MAX} s")
+        raise InvalidGoal(f"timeout = {timeout:g} is outside of {TIMEOUT_MIN} to {TIMEOUT_MAX} s")
     return float(timeout)
 
 
