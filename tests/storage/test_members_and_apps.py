@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -146,3 +147,31 @@ async def test_firmware_history_and_switches_survive(database: Database) -> None
     assert (later[Firmware].version, later[Firmware].automatic, later[Power].automatic) == ("9.0", True, True)
     assert later[Firmware].modules["motors.MCU_Motor"] == "9"
     assert later[Bluetooth].history == robot[Bluetooth].history
+
+
+async def test_members_changed_at_once_are_stored_so(database: Database) -> None:
+    members = members_of(database)
+    for name in ("anna", "ben", "eva"):
+        await members.add(name)
+    outcomes = await asyncio.gather(
+        members.remove("anna"),
+        members.rename("anna", "ann"),
+        members.rename("ben", "bob"),
+        members.rename("ben", "benno"),
+        members.set_face("eva", b"face"),
+        members.rename("eva", "eve"),
+        return_exceptions=True,
+    )
+    assert [isinstance(outcome, NotFound) for outcome in outcomes] == [False, True, False, True, False, False]
+    assert [(member.name, member.face) for member in members.all()] == [("bob", None), ("eve", b"face")]
+    assert members.all() == members_of(database).all()
+
+
+async def test_apps_changed_at_once_keep_their_room(database: Database) -> None:
+    robot = robot_of(database, LockstepClock())
+    apps, disk = robot[Apps], robot[Disk]
+    free = disk.free
+    await apps.install("tour", "1.0", io.BytesIO(b"x" * 1000))
+    await asyncio.gather(apps.remove("tour"), apps.install("tour", "1.1", io.BytesIO(b"x" * 2000)))
+    assert [app.version for app in apps.all()] == ["1.1"]
+    assert disk.free == free - 2000

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Sequence
 from typing import BinaryIO
 
@@ -20,6 +21,7 @@ class StoredApps(Apps):
 
     def __init__(self, database: Transactions, robot: str, clock: Clock, disk: Disk) -> None:
         self._database, self._robot, self._clock, self._disk = database, robot, clock, disk
+        self._turn = asyncio.Lock()  # of changes
         self._apps = {app.name: app for app in database.run_now(self._load)}
         for app in self._apps.values():
             disk.take(_place(app.name), app.size)
@@ -33,6 +35,10 @@ class StoredApps(Apps):
             raise InvalidGoal("an app has a name and a version that are not too long")
         if not 0 < size <= APP_BYTES_MAX:
             raise InvalidGoal(f"an app's package has 1 to {APP_BYTES_MAX} bytes")
+        async with self._turn:
+            return await self._install(name, version, package, size)
+
+    async def _install(self, name: str, version: str, package: BinaryIO, size: int) -> App:
         if name not in self._apps and len(self._apps) >= APPS_MAX:
             raise InvalidGoal(f"more than {APPS_MAX} apps")
         before = self._apps.get(name)
@@ -63,11 +69,12 @@ class StoredApps(Apps):
             )
 
     async def remove(self, name: str) -> None:
-        if name not in self._apps:
-            raise NotFound(f"no app is named {name!r}")
-        await self._database.remove(lambda connection: self._delete(connection, name))
-        self._apps.pop(name, None)
-        self._disk.release(_place(name))
+        async with self._turn:
+            if name not in self._apps:
+                raise NotFound(f"no app is named {name!r}")
+            await self._database.remove(lambda connection: self._delete(connection, name))
+            self._apps.pop(name)
+            self._disk.release(_place(name))
 
     def _delete(self, connection: Connection, name: str) -> None:
         for table in ("app", "app_piece"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import dataclasses
 from collections.abc import Sequence
 
@@ -17,6 +18,7 @@ class StoredMembers(Members):
 
     def __init__(self, database: Transactions, robot: str, clock: Clock, events: EventStream) -> None:
         self._database, self._robot, self._clock, self._events = database, robot, clock, events
+        self._turn = asyncio.Lock()  # of changes: each reads what the one before it stored
         self._members = {member.name: member for member in database.run_now(self._load)}
 
     def all(self) -> Sequence[Member]:
@@ -29,52 +31,59 @@ class StoredMembers(Members):
             raise NotFound(f"no member is named {name!r}") from None
 
     async def add(self, name: str, *, host: bool = False) -> Member:
-        self._check_free(name)
-        if len(self._members) >= MEMBERS_MAX:
-            raise InvalidGoal(f"more than {MEMBERS_MAX} members")
-
         def insert(connection: Connection) -> int:
             ((id,),) = connection.execute(
                 "INSERT INTO member (robot, name, host) VALUES (?, ?, ?) RETURNING id", (self._robot, name, int(host))
             ).fetchall()
             return int(id)
 
-        try:
-            id = await self._database.run(insert)
-        except AlreadyThere:  # added meanwhile
-            raise InvalidGoal(f"there is a member named {name!r} already") from None
-        return self._keep(Member(id, name, host))
+        async with self._turn:
+            self._check_free(name)
+            if len(self._members) >= MEMBERS_MAX:
+                raise InvalidGoal(f"more than {MEMBERS_MAX} members")
+            try:
+                id = await self._database.run(insert)
+            except AlreadyThere:  # added by another program
+                raise InvalidGoal(f"there is a member named {name!r} already") from None
+            return self._keep(Member(id, name, host))
 
     async def rename(self, name: str, new: str) -> Member:
-        member = self.get(name)
-        if new == name:
-            return member
-        self._check_free(new)
-        try:
-            await self._update(member, "name", new)
-        except AlreadyThere:
-            raise InvalidGoal(f"there is a member named {new!r} already") from None
-        self._members.pop(name, None)
-        return self._keep(dataclasses.replace(member, name=new))
+        async with self._turn:
+            member = self.get(name)
+            if new == name:
+                return member
+            self._check_free(new)
+            try:
+                await self._update(member, "name", new)
+            except AlreadyThere:
+                raise InvalidGoal(f"there is a member named {new!r} already") from None
+            self._members.pop(name)
+            return self._keep(dataclasses.replace(member, name=new))
 
     async def remove(self, name: str) -> None:
-        member = self.get(name)
-        await self._database.remove(lambda c: c.execute("DELETE FROM member WHERE id=?", (member.id,)))
-        self._members.pop(name, None)
-        self._publish()
+        async with self._turn:
+            member = self.get(name)
+            await self._database.remove(lambda c: c.execute("DELETE FROM member WHERE id=?", (member.id,)))
+            self._members.pop(name)
+            self._publish()
 
     async def set_face(self, name: str, face: bytes | None) -> Member:
-        await self._set_print(name, "face", face)
-        return self._keep(dataclasses.replace(self.get(name), face=face))
+        async with self._turn:
+            member = await self._set_print(name, "face", face)
+            return self._keep(dataclasses.replace(member, face=face))
 
     async def set_voice(self, name: str, voice: bytes | None) -> Member:
-        await self._set_print(name, "voice", voice)
-        return self._keep(dataclasses.replace(self.get(name), voice=voice))
+        async with self._turn:
+            member = await self._set_print(name, "voice", voice)
+            return self._keep(dataclasses.replace(member, voice=voice))
 
-    async def _set_print(self, name: str, column: str, value: bytes | None) -> None:
+    async def _set_print(self, name: str, column: str, value: bytes | None) -> Member:
+        """Store a print, and return the member as before."""
         if value is not None and not 0 < len(value) <= PRINT_MAX:
             raise InvalidGoal(f"a print has 1 to {PRINT_MAX} bytes")
-        await self._update(self.get(name), column, value)
+        member = self.get(name)
+        await self._update(member, column, value)
+        return member
 
     async def _update(self, member: Member, column: str, value: object) -> None:
         """Update one column; ``column`` is a constant of ours, never input."""

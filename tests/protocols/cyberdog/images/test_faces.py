@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import pytest
 
-from roboglot.model.components.interaction.members import Members
+from roboglot.model.components.interaction.members import Member, Members
 from roboglot.model.geometry import Pose
 from tests.protocols.cyberdog.phone import App, Client
 
@@ -34,6 +36,27 @@ async def test_a_face_is_entered_and_known_again(client: Client, app: App, robot
     assert await client.ask(7001, {"command": 0, "username": "ben"}) == {"result": 0}
     await passing(lambda: len(app.of(7003)) == 2)
     assert app.of(7003)[1] == {"result": 5921, "username": "ben"}
+
+
+async def test_of_entries_at_once_one_begins(client, app, robot, anna, passing, monkeypatch) -> None:
+    adding, stored, add = asyncio.Event(), asyncio.Event(), robot[Members].add
+
+    async def add_slowly(name: str, *, host: bool = False) -> Member:
+        if name == "anna":
+            adding.set()
+            await stored.wait()
+        return await add(name, host=host)
+
+    monkeypatch.setattr(robot[Members], "add", add_slowly)
+    first = asyncio.ensure_future(client.ask(7001, {"command": 0, "username": "anna"}))
+    await adding.wait()
+    assert await client.ask(7001, {"command": 0, "username": "ben"}) == {"result": 5911}
+    assert await client.ask(7002, {"command": 0}) == {"result": 5901}
+    stored.set()
+    assert await first == {"result": 0}
+    await passing(lambda: app.of(7003))
+    assert app.of(7003) == [{"result": 0, "username": "anna"}]
+    assert [member.name for member in robot[Members].all()] == ["anna"]
 
 
 async def test_faces_are_renamed_and_deleted(client, app, robot, anna, passing) -> None:

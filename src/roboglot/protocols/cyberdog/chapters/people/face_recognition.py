@@ -47,6 +47,7 @@ class Faces:
         self._entered = ExpectedMember(robot)
         self._asked = ""  # the expected member's name in the request
         self._robot, self._app = robot, app
+        self._adding = False  # the member whose face is to be entered
         self._looking: asyncio.Task[None] | None = None
         self._leave = robot.events.listen(MembersChanged, self._end_if_removed)
 
@@ -62,11 +63,18 @@ class Faces:
 
     @property
     def busy(self) -> bool:
-        """True while enrolling or recognising."""
-        return self._looking is not None and not self._looking.done()
+        """True while enrolling or recognising, and from the request on."""
+        return self._adding or (self._looking is not None and not self._looking.done())
 
-    def enter(self, name: str) -> None:
-        """Enrol the next face for a member; push 7003 reports the outcome. Raises NotFound."""
+    async def enter(self, name: str, *, host: bool) -> None:
+        """Enrol the next face for a member, added if unknown; push 7003 reports the outcome. Raises InvalidGoal."""
+        members = self._robot[Members]
+        if name not in {member.name for member in members.all()}:
+            self._adding = True
+            try:
+                await members.add(name, host=host)
+            finally:
+                self._adding = False
         self._expected.expect(name)
         self._asked = name
         self._begin(self._enter())

@@ -52,13 +52,11 @@ async def enter_face(
 
 async def _enter(call: Call, command: int, name: str, host: bool) -> dict[str, object]:
     """Begin (0), cancel (1) or confirm (2) the entry of a face."""
-    faces, members = call.context.faces, call.context.robot[Members]
+    faces = call.context.faces
     if command == 0:
         if faces.busy:
             return _refused(call, FaceResult.BUSY, BUSY)
-        if name not in {member.name for member in members.all()}:
-            await members.add(name, host=host)
-        faces.enter(name)
+        await faces.enter(name, host=host)
     elif command == 1:
         if not faces.entering:
             return _refused(call, FaceResult.STATE, "no face is being entered")
