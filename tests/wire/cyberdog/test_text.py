@@ -10,7 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.wire.cyberdog.text import Int32, NotJson, fitting, read_params, write
+from roboglot.wire.cyberdog.text import (
+    UNKNOWN_MAX,
+    Int32,
+    NotJson,
+    fitting,
+    read_params,
+    unknown_names,
+    why_unknown,
+    write,
+)
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
@@ -66,6 +75,14 @@ def test_number_lists(value: object, kept: bool) -> None:
 )
 def test_numbers(value: object, kept: bool) -> None:
     assert ("n" in fitting({"n": value}, FIELDS)) is kept
+
+
+def test_few_of_many_unknown_names_are_described() -> None:
+    names = [f"n{number}" for number in range(200_000)]
+    described = unknown_names(dict.fromkeys(["x", "bb", *names]), FIELDS, frozenset("x"))
+    assert list(described) == ["bb", *names[: UNKNOWN_MAX - 1]]
+    assert why_unknown("bool", described["bb"]) == "bool is unknown"
+    assert why_unknown("N", "n") == "N is unknown; did you mean 'n'?"
 
 
 def test_deep_nesting_is_refused() -> None:

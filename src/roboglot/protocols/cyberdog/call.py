@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from typing import TypeVar
 
+from roboglot.operations import BadParameters
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.stream import Stream
 from roboglot.values import dataclass
@@ -27,11 +28,19 @@ class Call:
     reply: Callable[[object], Awaitable[None]]
     why: str = ""  # the reason for a refusal, in plain words
     began: float | None = None  # robot time at which the tap noted the request
+    misspelt: Mapping[str, str] | None = None  # why unknown names were ignored, by the fields that they probably mean
 
     def refused(self, answer: Answer, why: str) -> Answer:
         """Return ``answer``, a refusal; ``why`` is for the log and for viewers of the exchange."""
         self.why = why
         return answer
+
+    def check_spelling(self, *fields: str) -> None:
+        """Raise BadParameters if one of these is misspelt: without it, more would be done than was asked."""
+        misspelt = self.misspelt or {}
+        for field in fields:
+            if field in misspelt:
+                raise BadParameters(misspelt[field])
 
 
 async def follow(call: Call, stream: Stream, seconds: float) -> object:

@@ -41,7 +41,16 @@ from roboglot.wire.cyberdog.codes import (
     WITH_FIELDS,
     InBandError,
 )
-from roboglot.wire.cyberdog.text import NotJson, fitting, mismatches, read_json, read_params, unknown_names, write
+from roboglot.wire.cyberdog.text import (
+    NotJson,
+    fitting,
+    mismatches,
+    read_json,
+    read_params,
+    unknown_names,
+    why_unknown,
+    write,
+)
 
 log = logging.getLogger(__name__)
 limited_log = LogLimiter(log)
@@ -168,9 +177,12 @@ def _valid_values(
     if len(valid) < len(values):
         wrong = mismatches(values, fields)
         unknown = unknown_names(values, fields, UNUSED.get(call.code, frozenset()))
-        if call.code in WITH_FIELDS and len(unknown) == len(values):
-            raise BadParameters("; ".join(unknown))
-        if ignored := "; ".join([*wrong, *unknown]):
+        reasons = [why_unknown(name, near) for name, near in unknown.items()]
+        if call.code in WITH_FIELDS and values.keys().isdisjoint(fields.__struct_fields__):
+            raise BadParameters("; ".join(reasons))
+        meant = zip(unknown.values(), reasons, strict=True)
+        call.misspelt = {near: why for near, why in meant if near and near not in values}
+        if ignored := "; ".join([*wrong, *reasons]):
             limited_log.warning(f"{call.code} {ignored}", "%d: ignored: %s", call.code, ignored)
     return valid, wrong
 

@@ -5,16 +5,18 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Set
 from functools import cache
+from itertools import islice
 from typing import Annotated, NoReturn
 
 import msgspec
 
-from roboglot.spelling import WORD_MAX, meant
+from roboglot.spelling import WORD_MAX, nearest
 from roboglot.validation import why_invalid
 
 # Used when the strict reader fails: raw line ends inside strings, as in one app's SDP.
 _lenient = json.JSONDecoder(strict=False, parse_constant=lambda name: _refuse(name))
 
+UNKNOWN_MAX = 16  # unknown names of a message that are described
 NOTHING = "{}"  # usual params of requests without fields
 Int32 = Annotated[int, msgspec.Meta(ge=-(2**31), le=2**31 - 1)]
 Three = Annotated[list[float], msgspec.Meta(min_length=3, max_length=3)]
@@ -86,14 +88,19 @@ def mismatches(values: Mapping[str, object], fields: type[msgspec.Struct]) -> li
     ]
 
 
-def unknown_names(values: Mapping[str, object], fields: type[msgspec.Struct], unused: Set[str]) -> list[str]:
-    """Describe the names in ``values`` that are neither fields nor ``unused``, with the field that was meant."""
+def unknown_names(values: Mapping[str, object], fields: type[msgspec.Struct], unused: Set[str]) -> dict[str, str]:
+    """Return the first names in ``values`` that are neither fields nor ``unused``: each with the field it means or "".
+
+    A message can have hundreds of thousands, and each takes a search.
+    """
     known = fields.__struct_fields__
-    return [
-        f"{name[:WORD_MAX]} is unknown{meant(name, known)}"
-        for name in values
-        if name not in known and name not in unused
-    ]
+    unknown = (name for name in values if name not in known and name not in unused)
+    return {name: nearest(name, known) for name in islice(unknown, UNKNOWN_MAX)}
+
+
+def why_unknown(name: str, near: str) -> str:
+    """Return a sentence about an unknown name and the field that was meant, if there is one."""
+    return f"{name[:WORD_MAX]} is unknown" + (f"; did you mean {near!r}?" if near else "")
 
 
 @cache

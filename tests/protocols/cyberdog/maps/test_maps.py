@@ -218,6 +218,13 @@ async def test_labels_are_set_replaced_and_deleted(client, robot, passing: Passi
     assert await client.ask(6002, nonsense) == {"error_code": 323}  # and the map is still there:
     for wrong in ({"only_delete": "true"}, {"only_delete": 1, "locationLabelInfo": [sofa]}, {}):
         assert await client.ask(6002, {"mapName": "home", **wrong}) == {"error_code": 323}
+    for misspelt in (
+        {"mapName": "home", "locationLabelinfo": [sofa], "only_delete": True},
+        {"mapName": "home", "locationLabelInfo": [sofa], "onlyDelete": True},
+        {"map_name": "home", "map_id": 1, "locationLabelInfo": [sofa]},
+    ):
+        assert await client.ask(6002, misspelt) == {"error_code": 323}
+    assert await labels() == [sofa, door]
     for no_list in ({}, "", 0, 0.0, False):  # each false in Python, as no labels are
         for more in ({}, {"only_delete": True}):
             assert await client.ask(6002, {"mapName": "home", "locationLabelInfo": no_list, **more}) == {
@@ -250,6 +257,16 @@ async def test_stopping_all_tasks_while_mapping(client: Client, robot: Robot, pa
     assert await state(client) == 101
     assert await client.ask(6009, {"type": 0, "map_name": "another"}) == {"result": 1}  # there is none to be saved
     assert await robot[MapLibrary].names() == ["all"]
+
+
+async def test_misspelt_name_discards_no_map(client: Client, robot: Robot, passing: Passing) -> None:
+    stream = Stream(client, 6004, {"type": 5})
+    await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
+    assert await client.ask(6009, {"type": 5, "mapName": "home"}) == {"error_code": 323}
+    assert await state(client) == 5
+    assert await client.ask(6009, {"type": 1, "mapName": "home"}) == {"result": 0}  # stopping needs no name
+    assert await client.ask(6009, {"type": 5, "map_name": "home", "mapName": "x"}) == {"result": 0}
+    assert await robot[MapLibrary].names() == ["home"]
 
 
 async def test_map_is_found_by_its_app_s_number(client: Client, robot: Robot) -> None:

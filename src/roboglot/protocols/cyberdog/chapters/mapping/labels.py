@@ -102,11 +102,13 @@ async def set_labels(
 ) -> dict[str, int]:
     """Replace the labels of a stored map; or delete the given ones; or, with none given, the map itself.
 
-    A name, a list or ``only_delete`` of the wrong type, taken as absent, would delete labels or a map: it is refused.
+    A name, a list or ``only_delete`` of the wrong type or misspelt, taken as absent, would delete labels or a map: it
+    is refused.
 
     With labels the map takes the number ``map_id`` on, if one is given; without a name it is the map of that number.
     """
     _check_number(map_id)
+    call.check_spelling("mapName", "locationLabelInfo", "only_delete")
     context = call.context
     library = context.robot[MapLibrary]
     if not isinstance(only_delete, bool):

@@ -141,6 +141,8 @@ async def stop_task(call: Call, *, type: Int32, map_name: object = "") -> dict[s
     """
     if not isinstance(map_name, str):
         raise BadParameters("map_name must be a text")  # taken as absent, it would discard the map
+    if type == TaskType.MAPPING:
+        call.check_spelling("map_name")
     try:
         result = await call.context.robot.clock.wait_for(_stop(call.context, type, map_name), STOP_MAX)
     except TimeoutError:
