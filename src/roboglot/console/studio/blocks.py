@@ -133,8 +133,11 @@ def _parameter(key: str, parameter: inspect.Parameter, labels: dict[str, Any]) -
     words = labels["parameters"][parameter.name]
     kind, name = _kind(str(parameter.annotation)), key.rpartition(".")[2]
     described: dict[str, object] = {"name": parameter.name, "kind": kind, **words}
-    if (start := labels["start"].get(f"{key.removeprefix('cyberdog.')}.{parameter.name}")) is not None:
+    path = f"{key.removeprefix('cyberdog.')}.{parameter.name}"
+    if (start := labels["start"].get(path)) is not None:
         described["start"] = start
+    if (unit := labels["units"].get(path)) is not None:
+        described["unit"] = unit
     default = None if parameter.default is inspect.Parameter.empty else parameter.default
     if (choices := choices_of(name, parameter.name)) is not None:
         enum, members = choices

@@ -14,6 +14,7 @@ from roboglot.values import dataclass
 
 RELATIVE = ("relatively_force_control_attitude", "relatively_position_control_attitude")
 ATTITUDES = ("absolute_attitude", "transition_standing", *RELATIVE)
+COUNTING = ("turn_on_recognition", "blocking_recognized", "sports_recognition", "training_words_recognized")
 STRIDE_MAX, DANCES_MAX = 0.065, 10  # of the choreographer, which clips larger values
 
 
@@ -50,9 +51,10 @@ OWN: dict[tuple[str, str], Limit] = {
     **{("navigation_to_coordinates", part): _POSE for part in ("x", "y", "z", "roll", "pitch", "yaw")},
     ("turn_on_recognition", "duration"): _LOOKING,
     ("recognized", "duration"): _LOOKING,
-    **{(name, "timeout"): Limit(1, gestures.DURATION_MAX) for name in ("recognized_any_gesture",)},
+    ("recognized_any_gesture", "timeout"): _LOOKING,
     ("recognized_designated_gesture", "timeout"): Limit(1, gestures.DURATION_MAX),
-    **{(name, "timeout"): _COUNTING for name in ("blocking_recognized", "sports_recognition")},
+    **{(name, "timeout"): _COUNTING for name in COUNTING},
+    **{(name, "volume"): Limit(0, 100) for name in ("sports_recognition", "to_preset", "turn_on_navigation")},
     ("face_recognized", "duration"): Limit(30, 300),
     ("voiceprint_recognized", "duration"): Limit(1, 30),
     ("moonwalk", "x_velocity"): Limit(-0.08, 0.08, 0.05),
@@ -60,7 +62,7 @@ OWN: dict[tuple[str, str], Limit] = {
     ("moonwalk", "stride"): Limit(0.001, STRIDE_MAX, 0.03),
     ("moonwalk", "number"): Limit(1, DANCES_MAX, 2),
     ("push_up", "frequency"): Limit(10, 60, 30),
-    ("push_up", "number"): Limit(1, DANCES_MAX, 2),
+    ("push_up", "number"): Limit(2, DANCES_MAX, 2),
 }
 WALK = Limit(WALK_DURATION.minimum, WALK_DURATION.maximum)  # all other durations belong to walks
 

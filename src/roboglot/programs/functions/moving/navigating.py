@@ -153,7 +153,7 @@ async def navigation_to_coordinates(
     pitch: float = 0.0,
     yaw: float = 0.0,
 ) -> Record:
-    """Go to a pose on the map; navigation must be on. z, roll and pitch are ignored."""
+    """Go to a pose on the map (m, rad); navigation must be on. z, roll and pitch are ignored."""
 
     async def do() -> None:
         _map_in_use(session)
