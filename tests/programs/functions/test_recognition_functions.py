@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from roboglot.model.actions import ActionStatus
@@ -112,6 +114,54 @@ async def test_recognition_ends_by_itself(caller: Caller, anna: Actor) -> None:
 async def test_gestures_that_cannot_be_recognised(caller: Caller, name: str, args: tuple[int, ...]) -> None:
     assert field(await caller(f"cyberdog.gesture.{name}", *args), "state.code") == 1
     assert caller.robot[Vision].gestures.latest is None
+
+
+@pytest.mark.parametrize(
+    ("name", "args", "seconds"),
+    [
+        ("gesture.recognized_designated_gesture", (4, THUMB), 4),
+        ("skeleton.blocking_recognized", (6,), 6),
+        ("personnel.face_recognized", (["Ben"], False, 30), 30),
+        ("personnel.voiceprint_recognized", (["Ben"], False, 3), 3),
+        ("train.training_words_recognized", (5,), 5),
+        ("lidar.get_data", (2,), 2),
+    ],
+)
+async def test_busy_machine_makes_no_wait_longer(
+    caller: Caller, world: World, anna: Actor, monkeypatch: pytest.MonkeyPatch, name: str, args: Any, seconds: float
+) -> None:
+    """Each look was taken to last as long as it should; at ten times the speed a timeout of 30 s took 41."""
+    await caller.robot[Members].add("Ben")
+    await caller("cyberdog.gesture.turn_on_recognition", 60)
+    await caller("cyberdog.skeleton.turn_on_recognition", 1, 5, 60)
+    world.faults.inject("lidar_gone", "a")
+    await caller.clock.advance(1.5)
+    sleep = caller.session.sleep
+    monkeypatch.setattr(caller.session, "sleep", lambda seconds: sleep(seconds + 0.04))
+    start = caller.clock.time()
+    await caller(f"cyberdog.{name}", *args)
+    assert caller.clock.time() - start == pytest.approx(seconds, abs=0.15)
+
+
+async def test_pauses_take_no_time_from_recognition(caller: Caller, anna: Actor) -> None:
+    """A program that was held up at a breakpoint found recognition off, and its wait over."""
+    await caller("cyberdog.skeleton.turn_on_recognition", 1, 5, 30)
+    waiting = caller.start("cyberdog.gesture.recognized", 30)
+    await caller.clock.advance(5.0)
+    for _ in range(2):
+        caller.session.pause()
+        caller.session.pause()  # as a suspension at a breakpoint
+        await caller.clock.advance(20.0)
+        caller.session.resume()
+        caller.session.resume()
+    await caller.clock.advance(5.0)
+    assert not waiting.done()
+    anna.gesture(Gesture.STOP, seconds=2)
+    await caller.clock.advance(2.0)
+    assert field(waiting.result(), "data").fields == {"stop_sign": True}
+    assert field(await caller("cyberdog.skeleton.instant_recognized"), "response.algo_switch") == 0
+    await caller.clock.advance(20.0)
+    assert field(await caller("cyberdog.skeleton.instant_recognized"), "response.algo_switch") == 2
 
 
 # -- exercises ---------------------------------------------------------------------------------------------------------

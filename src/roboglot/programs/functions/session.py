@@ -66,12 +66,21 @@ class Session:
         self._going_on.set()
         self._paused = asyncio.Event()
         self._end_watch: Callable[[], None] = _nothing  # of actions that begin during a pause
+        self._pauses = 0.0  # s, of robot time
+        self._paused_at = 0.0
+
+    @property
+    def awake(self) -> float:
+        """Robot time that stands still during the program's pauses, s: for times after which a call gives up."""
+        return (self.robot.clock.time() if self._going_on.is_set() else self._paused_at) - self._pauses
 
     def pause(self) -> None:
         """Pause the program's actions and waits, and actions that a call with several begins during the pause.
 
         An action that cannot be paused, such as an announcement, goes on to its end.
         """
+        if self._going_on.is_set():
+            self._paused_at = self.robot.clock.time()
         self._going_on.clear()
         self._paused.set()
         for action in self._actions():
@@ -83,6 +92,8 @@ class Session:
     def resume(self) -> None:
         """Continue the program's actions and waits."""
         self._end_watch()
+        if not self._going_on.is_set():
+            self._pauses += self.robot.clock.time() - self._paused_at
         self._paused.clear()
         self._going_on.set()
         for action in self._actions():

@@ -188,10 +188,10 @@ async def _turn_on(session: Session, outdoor: bool, assisted: bool, interact: bo
 
 async def _find_itself(session: Session, stored: StoredMap, assisted: bool, interact: bool) -> None:
     """Relocalize the robot; ``assisted``: retry for ``HELP_SECONDS`` while a person may help. Raises NotLocalized."""
-    clock, localization = session.robot.clock, session.robot[Localization]
-    deadline, asked = clock.time() + HELP_SECONDS, -ASKED_EVERY
+    localization = session.robot[Localization]
+    deadline, asked = session.awake + HELP_SECONDS, -ASKED_EVERY
     while True:
-        began = clock.time()
+        began = session.awake
         try:
             sky = sky_over(stored.anchor, session.robot)
             await session.complete(localization.relocalize(sky.region if sky else None, source=session.source))
@@ -199,12 +199,12 @@ async def _find_itself(session: Session, stored: StoredMap, assisted: bool, inte
                 return
             raise NotLocalized("the satellite fix places the robot elsewhere")
         except NotLocalized:
-            if not assisted or clock.time() >= deadline:
+            if not assisted or session.awake >= deadline:
                 raise
-        if interact and clock.time() - asked >= ASKED_EVERY:
-            asked = clock.time()
+        if interact and session.awake - asked >= ASKED_EVERY:
+            asked = session.awake
             await comment(session, REQUEST)
-        await session.sleep(max(0.0, 1.0 - (clock.time() - began)))
+        await session.sleep(max(0.0, 1.0 - (session.awake - began)))
 
 
 async def _go(session: Session, point: Point, yaw: float | None) -> None:

@@ -45,16 +45,16 @@ class GestureWatch:
     @property
     def on(self) -> bool:
         """True while looking for gestures."""
-        return self._viewer is not None and self._session.robot.clock.time() < self._until
+        return self._viewer is not None and self._session.awake < self._until
 
     def open(self, seconds: float) -> None:
-        """Look for gestures for ``seconds`` from now. Raises ComponentMissing, Busy."""
+        """Look for gestures for ``seconds`` from now; pauses do not count. Raises ComponentMissing, Busy."""
         if not self.on:
             self.close()
             self._viewer = self._session.robot[Vision].gestures.subscribe()
             self._seen.clear()
             self._watching = asyncio.create_task(self._watch(self._viewer), name="look for gestures")
-        self._until = self._session.robot.clock.time() + seconds
+        self._until = self._session.awake + seconds
 
     def close(self) -> None:
         """Stop looking for gestures."""
@@ -72,7 +72,7 @@ class GestureWatch:
         async for sighting in viewer:
             if viewer.closed:
                 return
-            if sighting.stamp >= self._until:
+            if self._session.awake >= self._until:
                 self.close()
                 return
             for gesture in sighting.seen:
@@ -121,7 +121,7 @@ async def _wait(
 ) -> Record:
     watch = session.part(GestureWatch)
     try:
-        left = _seconds("timeout", timeout, least)
+        until = session.awake + _seconds("timeout", timeout, least)
         if not 0 <= sensitivity <= SENSITIVITY_MAX:
             raise InvalidGoal(f"sensitivity = {sensitivity} is outside of 0 to {SENSITIVITY_MAX} s")
         if not watch.on:
@@ -133,10 +133,9 @@ async def _wait(
         seen = watch.seen(within)
         if (wanted in seen) if wanted else seen:
             return _gestures(state(), seen)
-        if left <= 0 or not watch.on:
+        if session.awake >= until or not watch.on:
             return _gestures(state(), set())
         await session.sleep(LOOK_EVERY)
-        left -= LOOK_EVERY
 
 
 def _seconds(name: str, value: int, least: int = DURATION_MIN) -> float:

@@ -56,10 +56,9 @@ async def face_recognized(
         _check("duration", duration, 30, 300)
         wanted = _named(session.robot, personnel_ids)
         with session.robot[Vision].faces.subscribe() as viewer:
-            left = duration
-            while not _enough(found.keys(), wanted, personnel_ids and and_operation) and left > 0:
+            until = session.awake + duration
+            while not _enough(found.keys(), wanted, personnel_ids and and_operation) and session.awake < until:
                 await session.sleep(LOOK_EVERY)
-                left -= LOOK_EVERY
                 found |= {face.name: face for look in viewer.drain() for face in look.seen if face.name in wanted}
         if not _enough(found.keys(), wanted, personnel_ids and and_operation):
             outcome = state(StateCode.FAIL, "time is up")
@@ -86,10 +85,10 @@ async def voiceprint_recognized(
         _check("duration", duration, 1, 30)
         _check("sensitivity", sensitivity, 0, SENSITIVITY_MAX)
         wanted = _named(session.robot, names)
-        listener, since, left = session.part(SpeechListener), session.robot.clock.time() - sensitivity, duration
-        while not _enough(heard.keys(), wanted, everyone) and left > 0:
+        listener, since = session.part(SpeechListener), session.robot.clock.time() - sensitivity
+        until = session.awake + duration
+        while not _enough(heard.keys(), wanted, everyone) and session.awake < until:
             await session.sleep(LOOK_EVERY)
-            left -= LOOK_EVERY
             heard |= {speech.name: None for speech in listener.heard(since) if speech.name in wanted}
     except RobotError as error:
         return Record("VoiceprintRecognized", {"state": state(StateCode.FAIL, str(error))})
@@ -111,10 +110,10 @@ async def training_words_recognized(session: Session, timeout: float = 5.0) -> R
     """Wait until one of these words is said (5 to 300 s); without one in time, it is empty: no failure."""
     outcome, word = state(), Record("MsgTrainingWords")
     try:
-        left, since, listener = usable(timeout), session.robot.clock.time(), session.part(SpeechListener)
-        while not word.fields and left > 0:
+        until, since = session.awake + usable(timeout), session.robot.clock.time()
+        listener = session.part(SpeechListener)
+        while not word.fields and session.awake < until:
             await session.sleep(LOOK_EVERY)
-            left -= LOOK_EVERY
             said = [speech.text.strip() for speech in listener.heard(since)]
             known = {word.trigger: word for word in known_words(session.robot)}
             word = next((_word(known[text]) for text in said if text in known), word)

@@ -110,10 +110,9 @@ async def next_scan(session: Session, timeout: int = 5) -> Record:
 
 async def newer(session: Session, stamp: Callable[[], float], timeout: int) -> None:
     """Wait for a newer reading than the current one, at most ``timeout`` seconds."""
-    present, left = stamp(), float(min(timeout, TIMEOUT_MAX))
-    while left > 0 and stamp() == present:
-        await session.sleep(min(LOOK_EVERY, left))
-        left -= LOOK_EVERY
+    present, until = stamp(), session.awake + min(timeout, TIMEOUT_MAX)
+    while stamp() == present and session.awake < until:
+        await session.sleep(LOOK_EVERY)
 
 
 def epoch(session: Session, stamp: float) -> float:

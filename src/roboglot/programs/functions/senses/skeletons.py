@@ -50,7 +50,7 @@ class ExerciseWatch:
     @property
     def progress(self) -> tuple[Switch, int, int, int]:
         """Values of algo_switch, sport_type, counts and duration (s)."""
-        if self._switch is Switch.OPEN and self._session.robot.clock.time() >= self._until:
+        if self._switch is Switch.OPEN and self._session.awake >= self._until:
             self._end(Switch.TIMEOUT)
         counter = self._counter
         counts, seconds = (counter.count, int(counter.duration)) if counter else (0, 0)
@@ -67,8 +67,8 @@ class ExerciseWatch:
         self._viewer = self._session.robot[Vision].skeletons.subscribe()
         self._counter = SportCounter(SPORTS[sport_type])
         self._sport_type, self._switch = sport_type, Switch.OPEN
-        self._until = self._session.robot.clock.time() + seconds
-        watch = self._watch(self._viewer, self._counter, counts, self._until)
+        self._until = self._session.awake + seconds
+        watch = self._watch(self._viewer, self._counter, counts)
         self._watching = asyncio.create_task(watch, name="count exercises")
 
     def close(self) -> None:
@@ -76,15 +76,13 @@ class ExerciseWatch:
         if self._switch is Switch.OPEN:
             self._end(Switch.CLOSED)
 
-    async def _watch(
-        self, viewer: Viewer[Sighting[SkeletonSeen]], counter: SportCounter, wanted: int, until: float
-    ) -> None:
-        """Count until ``wanted`` or the robot time ``until``; what was seen later does not count."""
+    async def _watch(self, viewer: Viewer[Sighting[SkeletonSeen]], counter: SportCounter, wanted: int) -> None:
+        """Count until ``wanted``, or until the time is up; what was seen later does not count."""
         who: int | None = None
         async for sighting in viewer:
             if viewer.closed:  # counting was ended, or began anew, before this was read
                 return
-            if sighting.stamp >= until:
+            if self._session.awake >= self._until:
                 self._end(Switch.TIMEOUT)
                 return
             for skeleton in sighting.seen:
@@ -173,10 +171,9 @@ async def sports_recognition(
 
 async def _change(session: Session, watch: ExerciseWatch, seconds: float) -> bool:
     """Wait for any progress, at most ``seconds``; return whether counts or duration changed."""
-    before, left = watch.progress, seconds
-    while watch.progress == before and left > 0:
+    before, until = watch.progress, session.awake + seconds
+    while watch.progress == before and session.awake < until:
         await session.sleep(LOOK_EVERY)
-        left -= LOOK_EVERY
     return watch.progress[2:] != before[2:]
 
 
