@@ -255,7 +255,7 @@ async def test_stopping_all_tasks_while_mapping(client: Client, robot: Robot, pa
     assert stream.answers[-1] == {"result": 0}
     assert await robot[MapLibrary].names() == ["all"]
     assert await state(client) == 101
-    assert await client.ask(6009, {"type": 0, "map_name": "another"}) == {"result": 1}  # there is none to be saved
+    assert await client.ask(6009, {"type": 0, "map_name": "another"}) == {"result": 0}  # all is stopped; none is saved
     assert await robot[MapLibrary].names() == ["all"]
 
 

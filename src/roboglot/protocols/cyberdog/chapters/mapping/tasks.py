@@ -174,13 +174,10 @@ async def _stop(context: Context, type: int, map_name: str) -> StopResult:
     running, type = tasks.current.kind if tasks.current else None, _kind_of(context, type)
     match type:
         case TaskType.ALL:
-            mapping = running == TaskType.MAPPING
-            if mapping and map_name and not await _keep_map(context, map_name):
+            if running == TaskType.MAPPING and map_name and not await _keep_map(context, map_name):
                 return StopResult.FAILED
             await tasks.stop()
             tasks.leave()
-            if map_name and not mapping:
-                return StopResult.FAILED  # there is no map to be saved
         case TaskType.MAPPING if running == type:
             if not await _keep_map(context, map_name):
                 return StopResult.FAILED
