@@ -137,6 +137,43 @@ async def test_map_of_earlier_life_is_loaded_and_found(home: Caller, world: Worl
     assert localization.pose.distance_to(pose) < 0.1
 
 
+async def cut_off(program: Caller, call: asyncio.Task[object]) -> None:
+    """End the program in the middle of its call, as a task's run does."""
+    call.cancel()
+    program.session.cancel("the program has ended")
+    for _ in range(10):
+        await program.clock.advance(0.5)
+    assert call.done()
+
+
+async def test_ended_program_keeps_no_other_map(home: Caller) -> None:
+    """The stored map stayed loaded, with the robot nowhere in it."""
+    home.robot[Mapping].move_origin(Point(0.5, -0.4))
+    before, pose = home.robot[Mapping].grid, home.robot[Localization].pose
+    stored = await home.robot[MapLibrary].get("home")
+    turning_on = home.start("cyberdog.navigation.turn_on_navigation")
+    await home.clock.advance(0.0)
+    assert same_origin(stored.grid, home.robot[Mapping].grid)
+    await cut_off(home, turning_on)
+    assert same_origin(before, home.robot[Mapping].grid)
+    assert home.robot[Localization].pose.distance_to(pose) < 0.1
+
+
+async def test_ended_program_says_nothing_more(home: Caller) -> None:
+    """The robot said that navigation had failed, after its program's end."""
+    with home.robot.events.subscribe(Spoke) as said:
+        going = home.start("cyberdog.navigation.to_preset", "kitchen", False, True, 40)
+        await home.clock.advance(1.0)
+        await cut_off(home, going)
+        another = Caller(home.robot, home.clock, "another")
+        training = another.start("cyberdog.skeleton.sports_recognition", 1, 2, 30)
+        await home.clock.advance(1.0)
+        another.session.cancel("the program was ended")
+        await home.clock.advance(5.0)
+        assert training.done()
+        assert said.drain() == []
+
+
 @pytest.mark.slow
 async def test_lost_robot_is_helped(home: Caller, monkeypatch: pytest.MonkeyPatch) -> None:
     localization, known = home.robot[Localization], []

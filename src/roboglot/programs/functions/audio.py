@@ -11,7 +11,7 @@ import numpy as np
 from roboglot.media.tunes import evening_waltz, romp
 from roboglot.model.actions import Action
 from roboglot.model.components.interaction.speaker import SPEAKER, Speaker, check_text
-from roboglot.model.errors import InvalidGoal, NotFound, RobotError
+from roboglot.model.errors import Busy, InvalidGoal, NotFound, RobotError
 from roboglot.model.sound import SAMPLE_RATE, Sound
 from roboglot.programs.functions.results import StateCode, state
 from roboglot.programs.functions.session import Session
@@ -137,7 +137,9 @@ def _check_sound(what: str | int) -> None:
 
 
 def _begin(session: Session, what: str | int) -> Action:
-    """Start saying a text, or playing the sound of a number."""
+    """Start saying a text, or playing the sound of a number. Raises Busy once the program has ended."""
+    if session.ended:
+        raise Busy("the program has ended")
     speaker = session.robot[Speaker]
     if isinstance(what, int):
         sound = PIECES[what]() if what in PIECES else bark(what)

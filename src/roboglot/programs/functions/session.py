@@ -61,6 +61,7 @@ class Session:
         self.states: dict[str, Record] = {}  # by group: state of its last call
         self.logging: set[str] = set()  # groups whose calls go to the log
         self.last_state = state()  # of the last call, for reports of blocks
+        self.ended = False  # a call that is still under way begins nothing more
         self._parts: dict[type[SessionState], SessionState] = {}
         self._going_on = asyncio.Event()
         self._going_on.set()
@@ -100,7 +101,11 @@ class Session:
             action.resume()
 
     def cancel(self, reason: str) -> None:
-        """Cancel all actions of the program and release its holds; the robot brakes by itself. Raises nothing."""
+        """End the program's use of the robot: cancel its actions and release its holds. Raises nothing.
+
+        The robot brakes by itself.
+        """
+        self.ended = True
         self._end_watch()
         for action in self._actions():
             action.cancel(reason)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Coroutine
 from dataclasses import replace
 
@@ -175,7 +176,7 @@ async def _turn_on(session: Session, outdoor: bool, assisted: bool, interact: bo
             load_map(robot, stored, pose)
         try:
             await _find_itself(session, stored, assisted, interact)
-        except RobotError:
+        except (RobotError, asyncio.CancelledError):  # the second at the program's end
             if was.width:
                 async with confirmed():
                     load_map(robot, replace(stored, grid=was, dock=home), pose)
