@@ -89,6 +89,17 @@ async def test_a_face_being_entered_keeps_its_member(client, app, robot, anna, w
     assert await client.ask(7001, {"command": 2, "username": "eva"}) == {"result": 0}
 
 
+async def test_recognition_follows_the_name_of_its_member(client, app, robot, anna, world, passing) -> None:
+    await robot[Members].add("anna")
+    await robot[Members].set_face("anna", anna.face)
+    world.stage.place("a", Pose(1.0, 1.0, 3.14))  # facing a wall
+    assert await client.ask(7002, {"command": 1, "username": "anna", "timeout": 9}) == {"result": 0}
+    assert await client.ask(1024, {"pre_name": "anna", "new_name": "eva"}) == {"success": True}
+    world.stage.place("a", Pose(anna.pose.x - 3.0, anna.pose.y, 0.0))
+    await passing(lambda: app.of(7004))
+    assert (app.of(7004)[0]["username"], app.of(7004)[0]["result"]) == ("eva", 0)
+
+
 async def test_no_one_is_recognised_there(client, app, robot, anna, world, passing) -> None:
     world.stage.place("a", Pose(1.0, 1.0, 3.14))  # facing a wall
     await robot[Members].add("anna")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from collections.abc import Coroutine
 from enum import IntEnum
 
 from roboglot.model.components.interaction.members import Members
 from roboglot.model.components.sensing.vision import Vision
-from roboglot.model.errors import RobotError
+from roboglot.model.errors import NotFound, RobotError
 from roboglot.model.events import MembersChanged
 from roboglot.model.perception import Emotion, FaceSeen
 from roboglot.model.robot import Robot
@@ -45,6 +46,7 @@ class Faces:
     def __init__(self, robot: Robot, app: AppLink) -> None:
         self._expected = ExpectedMember(robot)
         self._entered = ExpectedMember(robot)
+        self._wanted = ExpectedMember(robot)
         self._asked = ""  # the expected member's name in the request
         self._robot, self._app = robot, app
         self._adding = False  # the member whose face is to be entered
@@ -81,6 +83,9 @@ class Faces:
 
     def recognise(self, name: str, id: int, seconds: float) -> None:
         """Push 7004 for each member (only ``name``, if given) seen within ``seconds``; 5907 if none was."""
+        self._wanted.clear()
+        with contextlib.suppress(NotFound):  # perhaps it is added meanwhile
+            self._wanted.expect(name)
         self._begin(self._recognise(name, id, seconds))
 
     def stop(self) -> None:
@@ -139,6 +144,7 @@ class Faces:
             await self._robot.clock.wait_for(self._push_faces(name, id, reported), seconds)
         except TimeoutError:
             if not reported:
+                name = self._wanted.name or name
                 self._app.push(RECOGNISED, _recognised(FaceResult.TIMEOUT, name, id, 0.0, 0.0))
         except RobotError as error:
             log.info("face recognition ended: %s", error)
@@ -148,7 +154,7 @@ class Faces:
             async for sighting in sightings:
                 for face in sighting.seen:
                     again = sighting.stamp - reported.get(face.name, -AGAIN) < AGAIN
-                    if not face.name or again or wanted not in ("", face.name):
+                    if not face.name or again or (wanted and face.name != (self._wanted.name or wanted)):
                         continue
                     reported[face.name] = sighting.stamp
                     emotion = float(EMOTIONS.index(face.emotion))

@@ -76,13 +76,13 @@ def _check_face(members: Members, name: str) -> None:
         raise NotFound(f"no face of {name!r} is known")
 
 
-@TABLE.on(Code.RECOGNISE_FACES, right=Right.DRIVE, needs=(Vision,))
+@TABLE.on(Code.RECOGNISE_FACES, right=Right.DRIVE, needs=(Members, Vision))
 async def recognise_faces(
     call: Call, *, command: Int32, username: str = "", id: Int32 = 0, timeout: Seconds = 60
 ) -> dict[str, object]:
     """Recognise all faces (0) or ``username`` (1) for ``timeout`` s (1 to 300), or stop (2). Reports: push 7004."""
     faces = call.context.faces
-    call.context.robot.require(Vision)
+    call.context.robot.require(Vision, Members)
     if command == 2:
         if not faces.entering:
             faces.stop()
