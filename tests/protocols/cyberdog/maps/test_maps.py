@@ -259,6 +259,20 @@ async def test_stopping_all_tasks_while_mapping(client: Client, robot: Robot, pa
     assert await robot[MapLibrary].names() == ["all"]
 
 
+async def test_map_cleared_while_it_is_saved_is_loaded(client, robot, passing: Passing, monkeypatch) -> None:
+    stream, put = Stream(client, 6004, {"type": 5}), robot[MapLibrary].put
+    await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
+
+    async def put_slowly(stored: StoredMap) -> None:
+        robot[Mapping].clear()  # by another client
+        await put(stored)
+
+    monkeypatch.setattr(robot[MapLibrary], "put", put_slowly)
+    assert await client.ask(6009, {"type": 5, "map_name": "home"}) == {"result": 0}
+    await until(lambda: stream.ended)
+    await localized(client, passing)
+
+
 async def test_misspelt_name_discards_no_map(client: Client, robot: Robot, passing: Passing) -> None:
     stream = Stream(client, 6004, {"type": 5})
     await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)

@@ -66,12 +66,14 @@ async def keep_map(context: Context, name: str) -> bool:
     grid = mapping.grid
     if grid.width == 0 or len(name) > NAME_MAX:
         return False
+    survey, before = context.survey, context.stored_map
+    context.stored_map = name  # before it is on disk: another client that replaces the map meanwhile clears it
     try:
-        library, survey = context.robot[MapLibrary], context.survey
-        dock, stamp = known_dock(context.robot), context.robot.clock.epoch()
+        library, dock, stamp = context.robot[MapLibrary], known_dock(context.robot), context.robot.clock.epoch()
         await library.put(StoredMap(name, grid, stamp, outdoor=survey.outdoor, anchor=survey.anchor, dock=dock))
     except (RobotError, OSError) as error:
         log.warning("map %r was not saved: %s", name, error)
+        if context.stored_map == name:
+            context.stored_map = before
         return False
-    context.stored_map = name
     return True
