@@ -183,6 +183,7 @@ async def test_anyone_who_wears_the_bracelet_is_followed(client, robot, world, g
     none = Stream(client, 6004, {"type": 11})
     await passing(lambda: none.ended)
     assert none.codes == [1000, 1001, 15]
+    assert none.answers[-2]["feedback_msg"] == "no tag to follow was heard for 15 s"
     assert none.answers[-1] == {"result": 3}
     await connect(client, forward)
     gadget.place = Point(12.5, 6.0)

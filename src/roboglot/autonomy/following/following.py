@@ -101,7 +101,8 @@ class SightFollowing(Following):
                         self._spot(followed, sighting)
                     self._see_near(followed)
 
-                await self._run(action, followed, look, side, distance)
+                why = f"no person to follow was seen for {GIVE_UP_AFTER:g} s"
+                await self._run(action, followed, look, side, distance, why)
 
         goal = (person, side, distance)
         return start_on_base(self._robot, "follow", run, goal=goal, source=source)
@@ -117,7 +118,8 @@ class SightFollowing(Following):
                 if (tag := radio.tag) is not None and tag.stamp > followed.ranged_at:
                     self._range(followed, tag)
 
-            await self._run(action, followed, range_it, side, distance)
+            why = f"no tag to follow was heard for {GIVE_UP_AFTER:g} s"
+            await self._run(action, followed, range_it, side, distance, why)
 
         return start_on_base(self._robot, "follow tag", run, goal=(side, distance), source=source)
 
@@ -134,7 +136,8 @@ class SightFollowing(Following):
                 raise NotFound("there is no thing to follow")
             followed = _Followed(None)
             followed.spot(here.compose(Pose(thing.x, thing.y)).point, self._robot.clock.time(), here)
-            await self._run(action, followed, lambda: self._see(followed, lidar.scan), side, distance)
+            why = f"the thing to follow was not seen for {GIVE_UP_AFTER:g} s"
+            await self._run(action, followed, lambda: self._see(followed, lidar.scan), side, distance, why)
 
         goal = (place, side, distance)
         return start_on_base(self._robot, "follow thing", run, goal=goal, source=source)
@@ -164,8 +167,15 @@ class SightFollowing(Following):
             followed.spot(here.compose(Pose(now.x, now.y)).point, scan.stamp, here)
 
     async def _run(
-        self, action: Action, followed: _Followed, look: Callable[[], None], side: FollowSide, distance: float
+        self,
+        action: Action,
+        followed: _Followed,
+        look: Callable[[], None],
+        side: FollowSide,
+        distance: float,
+        why: str,
     ) -> None:
+        """Follow until cancelled; ``why``: the error if the followed is lost for long."""
         robot, base, self._followed = self._robot, self._robot[Base], followed
         while True:
             if await action.hold(lambda: base.set_velocity(STILL)):
@@ -173,7 +183,7 @@ class SightFollowing(Following):
             look()
             age = robot.clock.time() - followed.seen_at
             if age > GIVE_UP_AFTER:
-                raise NotFound(f"no person to follow was seen for {GIVE_UP_AFTER:g} s")
+                raise NotFound(why)
             if followed.place is None:
                 action.report("searching")
                 base.set_velocity(STILL)
