@@ -6,6 +6,7 @@ import shutil
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -33,7 +34,10 @@ from roboglot.model.components.logistics.industry import (
     Operation,
     RoundTemplate,
 )
+from roboglot.model.components.mapping.annotations import Line, LineKind, MapAnnotations
+from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.motion.navigation import Tracks
 from roboglot.model.components.system.firmware import Firmware, Module
 from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.geometry import Point, Pose
@@ -206,3 +210,33 @@ async def test_orders_go_on_after_a_full_disk(robot: Robot, world: World, clock:
     await clock.advance(30.0)
     assert status_of(robot, first).ended
     assert status_of(robot, second) is OrderStatus.SUCCEEDED
+
+
+@pytest.mark.slow
+@pytest.mark.world("empty")
+@pytest.mark.parametrize(
+    ("policy", "detour", "status"),
+    [
+        (Policy(tracks=Tracks.FREE, directed=True), False, OrderStatus.SUCCEEDED),
+        (Policy(tracks=Tracks.STRICT), True, OrderStatus.SUCCEEDED),
+        (Policy(tracks=Tracks.STRICT, directed=True), False, OrderStatus.FAILED),
+    ],
+)
+async def test_orders_follow_tracks_as_policies_say(
+    robot: Robot, clock: LockstepClock, policy: Policy, detour: bool, status: OrderStatus
+) -> None:
+    """The only track leads from the target's side to the robot's, in a bow."""
+    corners = [Point(2, 0), Point(2, 1.2), Point(0.2, 1.2), Point(0.2, 0)]
+    track = tuple(Line(0, LineKind.TRACK, start, end) for start, end in pairwise(corners))
+    await robot[MapAnnotations].change(lambda annotations: replace(annotations, lines=track))
+    await robot[Places].put(ROOM)
+    await robot[Delivery].change_policy(lambda _: policy)
+    await clock.advance(1.0)
+    (order,) = await robot[Delivery].accept(OrderRequest(OrderKind.RETURN, "room"))
+    highest = 0.0
+    for _ in range(60):
+        await clock.advance(0.5)
+        highest = max(highest, robot[Localization].pose.y)
+        if (now := status_of(robot, order)).ended:
+            break
+    assert (now, highest > 1.0) == (status, detour)
