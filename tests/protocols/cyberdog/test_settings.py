@@ -196,7 +196,8 @@ async def test_voice_board_is_activated_by_token_that_holds(client, app, robot, 
     assert asked == await client.ask(3001)
     assert (await client.ask(1001, {"is_audio_state": True, "uid": "77"}))["audio_state"] is False
     token = {"uid": 77, "token_access": "a", "token_fresh": "b", "token_expires_in": "60"}
-    assert await client.ask(3002, {**token, "token_expires_in": "soon"}) == {"result": False}
+    for wrong in ("soon", "6_0", "６０", " 60", "-60", "9" * 5000, 2**63, True):
+        assert await client.ask(3002, {**token, "token_expires_in": wrong}) == {"result": False}, wrong
     for wrong in (-1, "-1", 2**64, "", "who", "7" * 65):
         assert await client.ask(3002, {**token, "uid": wrong}) == {"result": False}, wrong
     assert await client.ask(3002, token) == {"result": True}

@@ -50,6 +50,6 @@ class Vda5050Config:
         host, colon, port = self.broker.rpartition(":")
         if not colon or (host.count(":") and not host.startswith("[")):
             return self.broker.strip("[]"), self.port
-        if not port.isdigit() or not 0 < int(port) < 65536:
+        if not (port.isdecimal() and len(port) <= 5 and 0 < int(port) < 65536):
             raise ValueError(f"vda5050.broker: {port!r} is not a port")
         return host.strip("[]"), int(port)

@@ -38,7 +38,7 @@ async def test_speed_limit_acts_at_once_until_robot_restarts(
     assert robot[Base].velocity.x == pytest.approx(0.3, abs=0.02)
     assert await put(client, "base.max_angular_speed", "0.5") == 200
     assert robot[Base].limits.twist == Twist(0.3, built.y, 0.5)
-    for nonsense in ("0", "-1", "99", "nan", "fast"):
+    for nonsense in ("0", "-1", "99", "nan", "fast", "0_0.5", "٠.٣", " 0.3 ", "1e999"):
         assert await put(client, "base.max_moving_speed", nonsense) == 400
     assert await put(client, "base.colour", "1") == 400
     strategy = await client.get(PARAMETER, params={"param": "docking.docked_register_strategy"})

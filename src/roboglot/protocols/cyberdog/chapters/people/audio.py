@@ -92,9 +92,8 @@ async def voiceprints(call: Call, *, voiceprints_data: str = "") -> str:
     return ""
 
 
-def _seconds(text: str | int) -> int | None:
-    try:
-        seconds = int(text)
-    except ValueError:
-        return None
-    return seconds if 0 < seconds <= LASTS_MAX else None
+def _seconds(value: str | int) -> int | None:
+    """Return a time to live, also one in decimal digits; None: there is none, or it is too long."""
+    text = str(value)
+    is_whole = text.isascii() and text.isdecimal() and len(text) <= ID_MAX
+    return int(text) if is_whole and 0 < int(text) <= LASTS_MAX else None

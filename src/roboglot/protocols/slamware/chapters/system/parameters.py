@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.emergency_stop import EmergencyStop, is_stopped
@@ -15,6 +17,7 @@ from roboglot.wire.slamware.chapters.system.devices import Parameter, Readable
 
 PARAMETER = "/api/core/system/v1/parameter"
 SWITCH = {"on": True, "off": False}
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 @TABLE.on(f"GET {PARAMETER}", right=Right.SEE, needs=(Base,), some=(Docking,))
@@ -56,10 +59,9 @@ def _release(robot: Robot) -> None:
 
 
 def _number(value: str | float) -> float:
-    try:
-        return float(value)
-    except ValueError:
-        raise InvalidGoal(f"'{value}' is not a number") from None
+    if isinstance(value, str) and not NUMBER.fullmatch(value):
+        raise InvalidGoal(f"'{value}' is not a number")
+    return float(value)
 
 
 def _switch(value: str | float) -> bool:
