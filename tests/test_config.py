@@ -48,7 +48,7 @@ def test_a_broker_as_a_url_is_refused(broker: str) -> None:
         load_config(None, {"vda5050": {"broker": broker}}, sections())
 
 
-@pytest.mark.parametrize("port", ["0", "65536", "²", "x", "9" * 5000])
+@pytest.mark.parametrize("port", ["0", "65536", "²", "x", "9" * 50])
 def test_brokers_port_is_checked(port: str) -> None:
     with pytest.raises(ValueError, match=r"vda5050\.broker: .* is not a port"):
         load_config(None, {"vda5050": {"broker": f"a:{port}"}}, sections())
